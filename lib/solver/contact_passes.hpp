@@ -11,6 +11,7 @@ struct ContactRow {
   Index point = 0;  ///< Number of the point.
   Index body = 0;   ///< The body that it may enter.
   ContactLaw law;
+  double apart = 0;  ///< As of `surface_touch` [m].
 };
 
 /// The forces of other bodies on a phyxel in a step [N], along normals and along surfaces.
@@ -55,8 +56,8 @@ struct ContactPasses {
     const SurfaceTouch found = surface_touch(
         threads, site[here.point], motion[here.point], entries_of_row(r),
         [&](Offset e) -> const SurfaceSite& { return site[near[e]]; },
-        [&](Offset e) -> const SurfaceMotion& { return motion[near[e]]; }, field[here.body], reach,
-        carries);
+        [&](Offset e) -> const SurfaceMotion& { return motion[near[e]]; }, field[here.body],
+        here.apart, reach, carries);
     if (threads.is_first()) touch[r] = found;
   }
   template <class Threads>

@@ -23,6 +23,9 @@ Box together(const Box& a, const Box& b) {
       {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)}};
 }
 
+/// Parts of one body that are nearer to each other at rest, in ranges, do not touch.
+constexpr double ranges_apart = 2;
+
 /// The part of a list that a phyxel is in.
 int part_of_list(const ContactCandidate& point) { return point.id % contact_threads; }
 
@@ -46,9 +49,8 @@ class Neighbours {
       const double range = common_range(point.site.range, other.site.range);
       if (norm(other.now - point.now) > range + skin_) return;
       if (!contact_.law_of(point.body, other.body)) return;
-      // Parts of one body that are near each other at rest do not touch.
-      const bool are_apart =
-          point.body != other.body || norm(other.site.rest - point.site.rest) > 2 * range;
+      const bool are_apart = point.body != other.body ||
+                             norm(other.site.rest - point.site.rest) > ranges_apart * range;
       if (are_apart) found.push_back(entry.index);
     });
     std::sort(found.begin(), found.end(), [&](Index a, Index b) {
@@ -121,7 +123,9 @@ ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandida
       const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
                           found.rows.back().body != body;
       if (is_new) {
-        found.rows.push_back({static_cast<Index>(p), body, *contact.law_of(points[p].body, body)});
+        const bool is_own = body == points[p].body;
+        found.rows.push_back({static_cast<Index>(p), body, *contact.law_of(points[p].body, body),
+                              is_own ? ranges_apart * points[p].site.range : 0});
       }
       entries.emplace_back(
           contact_threads * static_cast<Index>(found.rows.size() - 1) + part_of_list(points[k]), k);

@@ -176,13 +176,15 @@ PHYXEL_HD Sym3<double> inverse_along(Vec3<double> n, const Sym3<double>& t) {
 /// @param list of these phyxels, as of `OneThread::each`
 /// @param site_of,motion_of return those of an entry of the list
 /// @param field distances from the body's surface at rest
+/// @param least distance at rest between a point and a part of its own body that it may touch
+/// [m]; 0 for other bodies
 /// @param reach gap below which the point counts as inside, as a share of its range
 /// @param shares receive those of the entries; all zero if the point is outside
 template <class Threads, class SiteOf, class MotionOf>
 PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& site,
                                      const SurfaceMotion& point, const Offset* list,
                                      SiteOf&& site_of, MotionOf&& motion_of,
-                                     const DistanceField& field, double reach,
+                                     const DistanceField& field, double least, double reach,
                                      SurfaceShare* shares) {
   SurfaceTouch touch;
   threads.each(list, [&](Offset k) { shares[k] = {}; });
@@ -213,6 +215,9 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   back = scale * threads.sum(back);
   const Vec3<double> x =
       scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
+  // What leads back to the point's own neighbourhood is no other part of the body.
+  const Vec3<double> from_rest = x - site.rest;
+  if (dot(from_rest, from_rest) < least * least) return touch;
   const Gap gap = field.gap(x);
   const Vec3<double> m = transpose(back) * gap.normal;
   const double length = std::sqrt(dot(m, m));
