@@ -6,7 +6,8 @@ lattice, jitter and discretisation, several at a time on separate cores, and joi
 
 Times in the table are those of --cores cores, while other cores are busy. With --case, rows of that case are replaced in
 an existing table or added to it; with --meshes, rows of bodies from meshes. A fact then names the program that measured
-them, and the machine if it is another one.
+them, and the machine if it is another one. Problems of contact have a table of their own, which `phyxel accuracy contact`
+writes.
 bench/make_pages.py writes the page.
 """
 import argparse
@@ -24,7 +25,7 @@ OWN_WAYS = ["cycles", "simple-shear", "tube", "sphere", "taylor"]  # measured in
 
 def cases(program):
     text = subprocess.run([program, "accuracy", "--help"], check=True, capture_output=True, text=True).stdout
-    listed = text.split("Problems:", 1)[1].split("\n\n", 1)[0]
+    listed = text.split("Problems:", 1)[1].split("Problems of contact", 1)[0]
     return re.findall(r"^\s*([A-Za-z][\w-]*): ", listed, re.MULTILINE)
 
 

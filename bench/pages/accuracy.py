@@ -1,5 +1,5 @@
-"""docs/accuracy.md: errors beside time, from the tables of `phyxel accuracy`, `phyxel accuracy hard` and the studies of
-`phyxel_studies`."""
+"""docs/accuracy.md: errors beside time, from the tables of `phyxel accuracy`, `phyxel accuracy contact`, `phyxel accuracy
+hard` and the studies of `phyxel_studies`."""
 import math
 import re
 
@@ -23,6 +23,9 @@ says."""
 #: The discretisations in the summary.
 SUMMARY = ["cells, plain", "nodes, plain", "nodes, α = 0.1", "nodes, jitter 0.2, plain",
            "nodes, jitter 0.2, α = 0.1, closed", "mesh, plain", "mesh, α = 0.1", "mesh, α = 0.1, closed"]
+#: Those in the summary of contact.
+SUMMARY_OF_CONTACT = ["nodes, α = 0.1", "nodes, α = 0.1, closed", "nodes, jitter 0.2, α = 0.1, closed", "cells, α = 0.1",
+                      "mesh, α = 0.1", "mesh, α = 0.1, closed"]
 
 
 def cloud_of(row):
@@ -83,14 +86,12 @@ def short_error(error):
     return f"{100 * error:.2g}%" if error < 0.095 else f"{100 * error:.0f}%"
 
 
-def summary(page, table):
-    """Adds the errors of each discretisation at its finest resolution, side by side."""
-    there = {way_of(row) for row in table.rows}
-    ways = [way for way in SUMMARY if way in there]
-    if len(ways) < 2:
-        return  # nothing to compare
-    cells = []
+def finest_rows(table, ways, group):
+    """Of each quantity of a group of cases: its name, its rows at the finest resolution of each way (None where there is
+    none), and the largest number of phyxels."""
     for case in problems()["cases"]:
+        if case["group"] != group:
+            continue
         for quantity in table.values("quantity", case=case["name"]):
             rows = table.where(case=case["name"], quantity=quantity)
             finest = []
@@ -99,12 +100,33 @@ def summary(page, table):
                 # Among equally fine rows, the last.
                 finest.append(max(reversed(of_way), key=lambda row: row.number("across")) if of_way else None)
             most = max((row.number("phyxels") for row in rows if way_of(row) in ways), default=0)
-            cells.append([f"{case['name']}: {quantity}", f"{most:g}",
-                          *(short_error(row.number("error")) if row else "–" for row in finest)])
+            yield f"{case['name']}: {quantity}", finest, most
+
+
+def summary(page, table):
+    """Adds the errors of each discretisation at its finest resolution, side by side."""
+    there = {way_of(row) for row in table.rows}
+    ways = [way for way in SUMMARY if way in there]
+    if len(ways) < 2:
+        return  # nothing to compare
+    cells = [[name, f"{most:g}", *(short_error(row.number("error")) if row else "–" for row in finest)]
+             for name, finest, most in finest_rows(table, ways, "")]
     page.paragraph("## Summary")
     page.paragraph("Errors at the finest resolution of each problem, with the largest number of phyxels (cells have fewer). "
                    "By default, scenes have nodes (cells in round bodies) with α = 0.1, or meshes with α = 0.1, closed to 0.01.")
     page.add(markdown_table(["", "phyxels", *ways], cells))
+
+
+def summary_of_contact(page, table):
+    """Adds the errors of the problems of contact, each beside its time."""
+    there = {way_of(row) for row in table.rows}
+    ways = [way for way in SUMMARY_OF_CONTACT if way in there]
+    page.paragraph("## Contact")
+    page.paragraph("Errors at the finest resolution of each problem of contact, `phyxel accuracy contact`, each with the time from "
+                   f"the scene to the answer. Measured by {measured_by(table)}.")
+    page.add(markdown_table(["", "phyxels", *ways], [
+        [name, f"{most:g}", *(f"{short_error(row.number('error'))} in {time_of(row):.2g} s" if row else "–" for row in finest)]
+        for name, finest, most in finest_rows(table, ways, "contact")]))
 
 
 def beside_lammps(page, results):
@@ -241,9 +263,19 @@ def hard_section(page, results):
         page.add(refusals)
 
 
+def styles_of(tables):
+    """Colours by lattice and markers by terms, the same on all charts."""
+    rows = [row for table in tables for row in table.rows]
+    terms = ["plain", "closed", "α = 0.1", "α = 0.1, closed", *(terms_of(row) for row in rows)]
+    lattices = ["nodes", "cells", "mesh", *(row["lattice"] for row in rows)]
+    return {"lattice": {name: k for k, name in enumerate(dict.fromkeys(lattices))},
+            "terms": {name: k for k, name in enumerate(dict.fromkeys(terms))}}
+
+
 def make(results, link):
     """The page. Raises PageError if accuracy.csv is missing."""
     table = read_table(results / "accuracy.csv")
+    contact = read_if_there(results / "accuracy_contact.csv")
     page = Page(link)
     cases = problems()["cases"]
     page.paragraph(HEAD)
@@ -255,15 +287,15 @@ def make(results, link):
     apart = "".join(f"; {', '.join(names)} by {program}" for program, names in since.items())
     page.paragraph(f"Measured by {measured_by(table)}{apart}.")
     summary(page, table)
+    if contact:
+        summary_of_contact(page, contact)
     beside_lammps(page, results)
     hourglass(page, results)
-    terms = ["plain", "closed", "α = 0.1", "α = 0.1, closed", *(terms_of(row) for row in table.rows)]
-    styles = {"lattice": {name: k for k, name in enumerate(dict.fromkeys(["nodes", "cells", "mesh",
-                                                                          *table.values("lattice")]))},
-              "terms": {name: k for k, name in enumerate(dict.fromkeys(terms))}}
+    styles = styles_of([table, contact] if contact else [table])
     for case in cases:
-        for quantity in table.values("quantity", case=case["name"]):
-            section(page, table, case, quantity, styles)
+        own = contact if case["group"] == "contact" else table
+        for quantity in own.values("quantity", case=case["name"]) if own else ():
+            section(page, own, case, quantity, styles)
     for study in problems()["studies"]:
         study_section(page, results, study)
     hard_section(page, results)

@@ -25,7 +25,7 @@ Json problems() {
   Json cases = Json::array(), hard = Json::array(), studies = Json::array(),
        pictures = Json::array(), first = Json::array();
   for (const app::AccuracyCase& c : app::accuracy_cases()) {
-    cases.push_back({{"name", c.name}, {"what", c.what}, {"across", c.across}});
+    cases.push_back({{"name", c.name}, {"what", c.what}, {"across", c.across}, {"group", c.group}});
   }
   for (const app::HardCase& c : app::hard_cases()) {
     hard.push_back({{"name", c.name}, {"what", c.what}, {"tolerance", rounded(c.tolerance)}});

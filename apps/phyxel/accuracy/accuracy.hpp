@@ -54,13 +54,16 @@ struct AccuracyCase {
   std::vector<double> hourglass{0, 0.1};  ///< Strengths of hourglass control, likewise.
   /// Fillings that the case has; it is run with no others.
   std::vector<Filling> fillings{Filling::nodes, Filling::cells, Filling::mesh};
+  std::string group = {};  ///< A name that chooses several cases; empty for most.
 };
 
-std::vector<AccuracyCase> static_cases();    ///< Elastic bodies at rest.
-std::vector<AccuracyCase> dynamic_cases();   ///< Elastic bodies that move.
-std::vector<AccuracyCase> plastic_cases();   ///< Bodies of metal in uniform states.
-std::vector<AccuracyCase> collapse_cases();  ///< Bodies of metal under their collapse loads.
-std::vector<AccuracyCase> impact_cases();    ///< Bars of metal that strike a wall.
-std::vector<AccuracyCase> accuracy_cases();  ///< All of them.
+std::vector<AccuracyCase> static_cases();     ///< Elastic bodies at rest.
+std::vector<AccuracyCase> dynamic_cases();    ///< Elastic bodies that move.
+std::vector<AccuracyCase> plastic_cases();    ///< Bodies of metal in uniform states.
+std::vector<AccuracyCase> collapse_cases();   ///< Bodies of metal under their collapse loads.
+std::vector<AccuracyCase> impact_cases();     ///< Bars of metal that strike a wall.
+std::vector<AccuracyCase> contact_impacts();  ///< Bodies that hit each other.
+std::vector<AccuracyCase> contact_cases();    ///< These, and others that touch: "contact".
+std::vector<AccuracyCase> accuracy_cases();   ///< All of them.
 
 }  // namespace phyxel::app

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
@@ -30,7 +31,12 @@ std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
   const std::vector<AccuracyCase> all = accuracy_cases();
   std::vector<AccuracyCase> chosen;
   std::vector<std::string> known{"all"};
-  for (const AccuracyCase& c : all) known.push_back(c.name);
+  std::set<std::string> groups;
+  for (const AccuracyCase& c : all) {
+    known.push_back(c.name);
+    if (!c.group.empty()) groups.insert(c.group);
+  }
+  known.insert(known.end(), groups.begin(), groups.end());
   for (const std::string& name : names) {
     if (std::find(known.begin(), known.end(), name) == known.end()) {
       throw InputError(fmt::format("case {}: unknown{}; allowed: {}", name,
@@ -38,8 +44,9 @@ std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
     }
   }
   for (const AccuracyCase& c : all) {
-    const bool wanted = std::find(names.begin(), names.end(), c.name) != names.end() ||
-                        std::find(names.begin(), names.end(), "all") != names.end();
+    const bool wanted = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
+      return name == c.name || name == "all" || (!c.group.empty() && name == c.group);
+    });
     if (wanted) chosen.push_back(c);
   }
   return chosen;
@@ -126,6 +133,20 @@ void measure(const AccuracyOptions& options) {
   }
 }
 
+/// The names and descriptions of all cases, for help.
+std::string listed_cases() {
+  const std::vector<AccuracyCase> cases = accuracy_cases();
+  std::string text = "Problems:";
+  for (const AccuracyCase& c : cases) {
+    if (c.group.empty()) text += fmt::format("\n{}: {}", c.name, c.what);
+  }
+  text += "\nProblems of contact, all of which \"contact\" names:";
+  for (const AccuracyCase& c : cases) {
+    if (!c.group.empty()) text += fmt::format("\n{}: {}", c.name, c.what);
+  }
+  return text;
+}
+
 struct HardOptions {
   std::string device = "cpu";
   std::vector<std::string> precisions{"double", "mixed", "float"};
@@ -171,9 +192,7 @@ void add_accuracy(CLI::App& program) {
       "Solve problems with known answers on the CPU in double, and print errors and "
       "times");
   auto options = std::make_shared<AccuracyOptions>();
-  std::string known = "Problems:";
-  for (const AccuracyCase& c : accuracy_cases()) known += fmt::format("\n{}: {}", c.name, c.what);
-  command->add_option("cases", options->cases, known)->capture_default_str();
+  command->add_option("cases", options->cases, listed_cases())->capture_default_str();
   command
       ->add_option("--across", options->across,
                    "Numbers of cells across the thinner sides "

@@ -412,8 +412,8 @@ std::vector<AccuracyCase> dynamic_cases() {
 
 std::vector<AccuracyCase> accuracy_cases() {
   std::vector<AccuracyCase> all;
-  for (const auto& cases :
-       {static_cases(), dynamic_cases(), plastic_cases(), collapse_cases(), impact_cases()}) {
+  for (const auto& cases : {static_cases(), dynamic_cases(), plastic_cases(), collapse_cases(),
+                            impact_cases(), contact_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -127,23 +127,25 @@ void jitter_inside(Cloud& cloud, const std::vector<char>& on_surface, double jit
 }
 
 /// The cloud as a discretisation has it: as it is, jittered, or spread on and in its surface.
+/// @param touches true if the body keeps its surface also without closed gradients
 Cloud filled(Cloud cloud, const std::vector<char>& on_surface, const Discretisation& d,
-             double spacing) {
+             double spacing, bool touches = false) {
   if (d.filling == Filling::mesh) {
     cloud = sample_surface(
         cloud.surface, {.phyxels = static_cast<Index>(cloud.position.size()), .on_surface = true});
   } else if (d.jitter > 0) {
     jitter_inside(cloud, on_surface, d.jitter, spacing);
   }
-  if (d.closure == 0) cloud.surface = {};
+  if (d.closure == 0 && !touches) cloud.surface = {};
   order_along_curve(cloud);
   return cloud;
 }
 
-Cloud bent(const std::vector<BentBlock>& blocks, const Discretisation& d, double spacing) {
+Cloud bent(const std::vector<BentBlock>& blocks, const Discretisation& d, double spacing,
+           bool touches = false) {
   BentLattice lattice(blocks, 1e-6 * spacing);
   const std::vector<char> on_surface = lattice.on_surface();
-  return filled(lattice.take(), on_surface, d, spacing);
+  return filled(lattice.take(), on_surface, d, spacing, touches);
 }
 
 /// The surface of a cylinder: its side cut into triangles, its caps fans about the axis.
@@ -201,6 +203,30 @@ Cloud eighth_of_shell(const Discretisation& d, double inner_radius, double outer
          }});
   }
   return bent(blocks, d, spacing);
+}
+
+Cloud eighth_of_ball(const Discretisation& d, double radius) {
+  const double spacing = 2 * radius / d.across;
+  const int around = static_cast<int>(std::lround(0.25 * pi * radius / spacing)),
+            deep = static_cast<int>(std::lround(0.5 * radius / spacing));
+  // A place whose largest component is 1, between the middle and the inner block's outside.
+  const auto inside = [=](Vec3d side) { return 0.5 * radius * (0.4 + 0.6 / norm(side)) * side; };
+  std::vector<BentBlock> blocks{
+      {{around, around, around}, [=](Vec3d p) {
+         const Vec3d side{std::tan(0.25 * pi * p.x), std::tan(0.25 * pi * p.y),
+                          std::tan(0.25 * pi * p.z)};
+         const double largest = std::max({side.x, side.y, side.z});
+         return largest == 0 ? Vec3d{} : largest * inside((1 / largest) * side);
+       }}};
+  for (int axis = 0; axis < 3; ++axis) {
+    blocks.push_back(
+        {{around, around, deep}, [=](Vec3d p) {
+           const double side[3] = {std::tan(0.25 * pi * p.x), std::tan(0.25 * pi * p.y), 1};
+           const Vec3d v{side[(5 - axis) % 3], side[(6 - axis) % 3], side[(7 - axis) % 3]};
+           return (1 - p.z) * inside(v) + (p.z * radius / norm(v)) * v;
+         }});
+  }
+  return bent(blocks, d, spacing, true);
 }
 
 Cloud rod(const Discretisation& d, double radius, double length) {

@@ -12,6 +12,9 @@ Cloud quarter_tube(const Discretisation& d, double inner_radius, double outer_ra
 /// An eighth of a hollow sphere, x, y and z >= 0. `across` counts cells of the wall. Nodes or a
 /// mesh.
 Cloud eighth_of_shell(const Discretisation& d, double inner_radius, double outer_radius);
+/// An eighth of a ball about the origin, x, y and z >= 0, with its surface. `across` counts cells
+/// of the diameter. Nodes or a mesh.
+Cloud eighth_of_ball(const Discretisation& d, double radius);
 /// A cylinder about the z axis from z = 0 to `length`. `across` counts cells of the diameter. Nodes
 /// are rings of 6, 12, 18 ... about the axis; cells, those of the built-in shape, with surfels. The
 /// region "z-" is the end at z = 0.
