@@ -22,7 +22,7 @@ The tables come from scripts/measure_gpu.sh, measure_accuracy.py and profile_gpu
     build/cpu/bin/phyxel_studies laws --csv docs/results/laws.csv --force
     build/cpu/bin/phyxel_studies neighbour-search --csv docs/results/cpu_neighbours.csv --force
     build/cpu/bin/phyxel accuracy hard --long --csv docs/results/hard_cases_cpu.csv --force
-    OMP_NUM_THREADS=1 build/cpu/bin/phyxel accuracy contact --csv docs/results/accuracy_contact.csv --force
+    taskset -c 0 build/cpu/bin/phyxel accuracy contact --csv docs/results/accuracy_contact.csv --force
 """
 import argparse
 import difflib
