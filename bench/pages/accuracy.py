@@ -121,9 +121,10 @@ def summary_of_contact(page, table):
     """Adds the errors of the problems of contact, each beside its time."""
     there = {way_of(row) for row in table.rows}
     ways = [way for way in SUMMARY_OF_CONTACT if way in there]
+    beside = table.fact("beside")  # what ran beside it, if someone has added that to the table
     page.paragraph("## Contact")
     page.paragraph("Errors at the finest resolution of each problem of contact, `phyxel accuracy contact`, each with the time from "
-                   f"the scene to the answer. Measured by {measured_by(table)}.")
+                   f"the scene to the answer. Measured by {measured_by(table)}{beside and '; ' + beside}.")
     page.add(markdown_table(["", "phyxels", *ways], [
         [name, f"{most:g}", *(f"{short_error(row.number('error'))} in {time_of(row):.2g} s" if row else "–" for row in finest)]
         for name, finest, most in finest_rows(table, ways, "contact")]))

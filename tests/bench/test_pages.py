@@ -2,6 +2,7 @@
 import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -65,6 +66,20 @@ def test_a_page_about_accuracy_is_made_of_what_accuracy_writes(tmp_path):
     assert "## gravity: deflection" in text and "nodes, α = 0.3, closed" in text
     assert "**nodes, α = 0.3** | 3 | 256 |" in text  # finer is better, and slower
     assert "![gravity: deflection, regular lattices](tables/accuracy_gravity_deflection_regular.svg)" in text
+
+
+def test_problems_of_contact_have_a_table_and_a_summary_of_their_own(tmp_path):
+    phyxel(tmp_path, "accuracy", "rotation", "--across", "2", "--lattice", "nodes", "--csv", "accuracy.csv")
+    assert "## Contact" not in page_of("accuracy", tmp_path)
+    phyxel(tmp_path, "accuracy", "slope", "bars", "--across", "2,3", "--lattice", "nodes", "--jitter", "0", "--factor", "2.2",
+           "--csv", "accuracy_contact.csv")
+    text = page_of("accuracy", tmp_path)
+    assert text.index("## rotation") < text.index("## bars: energy") < text.index("## slope: way")
+    assert "| nodes, factor 2.2, α = 0.1, closed | 3 |" in text.replace("**", "")
+    phyxel(tmp_path, "accuracy", "slope", "--across", "4", "--lattice", "mesh", "--csv", "accuracy_contact.csv", "--force")
+    summed = page_of("accuracy", tmp_path).split("## Contact", 1)[1].split("## ", 1)[0]
+    assert "|  | phyxels | mesh, α = 0.1 | mesh, α = 0.1, closed |" in summed
+    assert re.search(r"\| slope: way \| 125 \| \S+ in \S+ s \| \S+ in \S+ s \|", summed)
 
 
 def test_studies_pictures_and_hard_cases_are_on_the_page(tmp_path):
