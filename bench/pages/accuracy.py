@@ -23,7 +23,7 @@ says."""
 #: The discretisations in the summary.
 SUMMARY = ["cells, plain", "nodes, plain", "nodes, α = 0.1", "nodes, jitter 0.2, plain",
            "nodes, jitter 0.2, α = 0.1, closed", "mesh, plain", "mesh, α = 0.1", "mesh, α = 0.1, closed"]
-#: Those in the summary of contact.
+#: The discretisations in the summary of contact.
 SUMMARY_OF_CONTACT = ["nodes, α = 0.1", "nodes, α = 0.1, closed", "nodes, jitter 0.2, α = 0.1, closed", "cells, α = 0.1",
                       "mesh, α = 0.1", "mesh, α = 0.1, closed"]
 
@@ -87,8 +87,8 @@ def short_error(error):
 
 
 def finest_rows(table, ways, group):
-    """Of each quantity of a group of cases: its name, its rows at the finest resolution of each way (None where there is
-    none), and the largest number of phyxels."""
+    """Yields, for each quantity of a group of cases, its name, the row of each way at its finest resolution (None without
+    rows), and the largest number of phyxels."""
     for case in problems()["cases"]:
         if case["group"] != group:
             continue

@@ -63,7 +63,7 @@ std::vector<AccuracyCase> plastic_cases();    ///< Bodies of metal in uniform st
 std::vector<AccuracyCase> collapse_cases();   ///< Bodies of metal under their collapse loads.
 std::vector<AccuracyCase> impact_cases();     ///< Bars of metal that strike a wall.
 std::vector<AccuracyCase> contact_impacts();  ///< Bodies that hit each other.
-std::vector<AccuracyCase> contact_cases();    ///< These, and others that touch: "contact".
+std::vector<AccuracyCase> contact_cases();    ///< Bodies in contact: the group "contact".
 std::vector<AccuracyCase> accuracy_cases();   ///< All of them.
 
 }  // namespace phyxel::app

@@ -52,7 +52,7 @@ Scene pressed_ball(const Discretisation& d, double duration) {
   return scene;
 }
 
-/// What finite elements know of a pressed ball, in its present state.
+/// Quantities of a pressed ball in its present state; references are those of finite elements.
 /// @param force on the eighth of the ball [N]
 std::vector<Quantity> of_pressed_ball(const Model& model, Backend& backend, Vec3d force) {
   std::vector<Mat3d> gradient;
@@ -67,6 +67,7 @@ std::vector<Quantity> of_pressed_ball(const Model& model, Backend& backend, Vec3
           {"pressure at the pole", -stress(2, 2), 0.1455 * E}};
 }
 
+/// Solves for the pressed ball at rest by Newton's method.
 Solution hertz(const Discretisation& d) {
   const auto begin = Clock::now();
   const Scene scene = pressed_ball(d, 1);
@@ -86,7 +87,7 @@ Solution hertz(const Discretisation& d) {
   return solution;
 }
 
-/// The same by damped steps.
+/// Solves for the pressed ball by damped Verlet steps.
 Solution hertz_by_steps(const Discretisation& d) {
   constexpr double duration = 0.05;  // four periods of the ball's slowest mode [s]
   Scene scene = pressed_ball(d, duration);
@@ -97,7 +98,7 @@ Solution hertz_by_steps(const Discretisation& d) {
   return ball.solution(of_pressed_ball(ball.model(), ball.backend(), force));
 }
 
-/// A ball that slides on a plane until it rolls.
+/// Simulates a ball that slides on a plane until it rolls.
 Solution rolling(const Discretisation& d) {
   constexpr double radius = 0.1, speed = 1, friction = 0.2;
   constexpr double rolls = 2 * speed / (7 * friction * gravity);  // [s]
@@ -131,7 +132,7 @@ Solution rolling(const Discretisation& d) {
 constexpr double block_side = 0.2, angle = std::numbers::pi / 6, slope_friction = 0.3;
 constexpr double slope_speed = 0.5;  ///< At the start: above those of the block's vibrations [m/s].
 
-/// A block that slides down an inclined plane. Gravity is turned instead of the plane.
+/// Simulates a block that slides down an inclined plane. Gravity is turned instead of the plane.
 Solution slope(const Discretisation& d) {
   Scene scene;
   scene.gravity = gravity * Vec3d{std::sin(angle), 0, -std::cos(angle)};
@@ -150,7 +151,7 @@ Solution slope(const Discretisation& d) {
   return block.solution({{"way", block.moved(0).x, slope_speed * time + 0.5 * pull * time * time}});
 }
 
-/// Two blocks, one on the other, that planes press. Their clouds do not match.
+/// Simulates two blocks, one on the other, that planes press. Their clouds do not match.
 Solution pressed_blocks(const Discretisation& d) {
   constexpr double width = 0.4, height = 0.2, approach = 1e-3 * 2 * height;
   const double stress = E * approach / (2 * height);

@@ -10,7 +10,7 @@
 namespace phyxel::app {
 namespace {
 
-/// The momentum of the second of two bodies along x after each step, and what follows from it.
+/// History of a body's momentum along x, one value per step.
 class Push {
  public:
   explicit Push(double dt) : dt_(dt) {}
@@ -38,7 +38,7 @@ class Push {
 
 constexpr double side = 0.2, first_length = 1;  // of bars [m]
 
-/// Two bars that meet end to end.
+/// Simulates two bars that meet end to end.
 /// @param second_length [m]
 Solution meeting_bars(const Discretisation& d, double second_length) {
   const double speed_of_sound = std::sqrt(E / rho), speed = 1e-3 * speed_of_sound;
@@ -81,7 +81,7 @@ Solution meeting_bars(const Discretisation& d, double second_length) {
 Solution equal_bars(const Discretisation& d) { return meeting_bars(d, first_length); }
 Solution unequal_bars(const Discretisation& d) { return meeting_bars(d, 2 * first_length); }
 
-/// Two equal balls that meet.
+/// Simulates two equal balls that meet.
 Solution meeting_balls(const Discretisation& d) {
   constexpr double radius = 0.1;
   const double speed_of_sound = std::sqrt(E / rho), speed = 0.02 * speed_of_sound;

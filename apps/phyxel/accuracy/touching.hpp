@@ -1,4 +1,4 @@
-/// Bodies of contact problems on their way.
+/// Models of contact problems and their time stepping.
 #pragma once
 
 #include <chrono>
@@ -15,8 +15,8 @@
 
 namespace phyxel::app {
 
-/// Bodies, stepped by Verlet's method in double with 0.8 of the largest stable step, as scenes are
-/// by default.
+/// A model of touching bodies, stepped by Verlet's method in double with 0.8 of the largest stable
+/// step, as scenes are by default.
 class Touching {
  public:
   /// @param clouds function that returns the clouds of the scene's bodies, in place
@@ -36,7 +36,7 @@ class Touching {
   /// Angular momentum of a body about its centre of mass [kg m²/s].
   Vec3d turning(std::size_t part) const;
 
-  /// The solution, of the time since construction.
+  /// The solution; its time ends now.
   Solution solution(std::vector<Quantity> found) const;
 
  private:
@@ -48,7 +48,7 @@ class Touching {
   std::unique_ptr<Solver> solver_;
 };
 
-/// A body of a contact problem.
+/// A body with the material and the terms of a contact problem, without a source.
 BodyRequest contact_body(const Discretisation& d, const char* name, double poisson);
 /// A block about the origin, with its surface. @param spacing between nodes [m]
 Cloud block_cloud(const Discretisation& d, Vec3d size, double spacing);
