@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "mesh/winding_number.hpp"
 #include "model/box.hpp"
@@ -11,6 +12,8 @@ namespace {
 
 constexpr int edge = DistanceField::edge, side = edge + 1;
 constexpr double everywhere = HUGE_VAL;
+// Distances of neighbours differ by no more than what separates them; the rest is for rounding.
+constexpr double slack = 1.001;
 
 /// The number of nodes of a grid: corners of coarse cells, and nodes of the bricks that a surface
 /// of an area [m²] has.
@@ -37,13 +40,27 @@ class SignedDistances {
  public:
   explicit SignedDistances(const Surface& surface) : tree_(surface) {}
 
-  double at(Vec3d x) const { return sign_at(x) * tree_.distance(x, everywhere); }
+  /// Finds the distances at points along x [m]. @param start the first one. @param step from each
+  /// to the next one [m]
+  void fill_line(Vec3d start, double step, std::span<float> values) const {
+    double before = 0;
+    Index nearest = -1;
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      const Vec3d x = start + Vec3d{static_cast<double>(k) * step, 0, 0};
+      const double found =
+          tree_.distance(x, k == 0 ? everywhere : std::abs(before) + slack * step, &nearest);
+      const bool has_sign = k > 0 && std::abs(before) + found > slack * step;
+      before = (has_sign ? (before < 0 ? -1 : 1) : sign_at(x)) * found;
+      values[k] = static_cast<float>(before);
+    }
+  }
   /// The unsigned distance [m], or `most` where it is larger.
   double unsigned_at(Vec3d x, double most) const { return tree_.distance(x, most); }
 
   /// Finds the distances at the nodes of a brick [m], shape [nodes].
   void fill(Vec3d low, double spacing, float* node) const {
     double distance[DistanceField::nodes];  // signed
+    Index nearest = -1;                     // triangle
     for (int k = 0; k < DistanceField::nodes; ++k) {
       const int at[] = {k % side, k / side % side, k / (side * side)};
       const int step[] = {1, side, side * side};
@@ -52,14 +69,13 @@ class SignedDistances {
       for (int axis = 0; axis < 3; ++axis) {
         if (at[axis] > 0) most = std::min(most, std::abs(distance[k - step[axis]]));
       }
-      // Neighbours differ by no more than what separates them; the rest is for rounding.
-      const double found = tree_.distance(x, most + 1.001 * spacing);
+      const double found = tree_.distance(x, most + slack * spacing, &nearest);
       double sign = 0;
       for (int axis = 0; axis < 3 && sign == 0; ++axis) {
         if (at[axis] == 0) continue;
         const double before = distance[k - step[axis]];
         // No surface is between two nodes that are farther from it than from each other.
-        if (std::abs(before) + found > 1.001 * spacing) sign = before < 0 ? -1 : 1;
+        if (std::abs(before) + found > slack * spacing) sign = before < 0 ? -1 : 1;
       }
       distance[k] = (sign != 0 ? sign : sign_at(x)) * found;
       node[k] = static_cast<float>(distance[k]);
@@ -118,17 +134,22 @@ DistanceArrays distances_from(const Surface& surface, double spacing, double ban
   const SignedDistances distances(surface);
   const Vec3<int> corners{n.x + 1, n.y + 1, n.z + 1};
   made.coarse.resize(static_cast<std::size_t>(corners.x) * corners.y * corners.z);
-#pragma omp parallel for schedule(dynamic, 64)
-  for (std::size_t k = 0; k < made.coarse.size(); ++k) {
-    made.coarse[k] =
-        static_cast<float>(distances.at(place(static_cast<std::int64_t>(k), corners, 0)));
+  const auto line = static_cast<std::size_t>(corners.x);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t k = 0; k < made.coarse.size(); k += line) {
+    distances.fill_line(place(static_cast<std::int64_t>(k), corners, 0), cell,
+                        std::span(made.coarse).subspan(k, line));
   }
   made.brick.resize(static_cast<std::size_t>(n.x) * n.y * n.z);
   const double reach = band + std::sqrt(0.75) * cell;
 #pragma omp parallel for schedule(dynamic, 64)
   for (std::size_t k = 0; k < made.brick.size(); ++k) {
-    const Vec3d middle = place(static_cast<std::int64_t>(k), n, 0.5);
-    made.brick[k] = distances.unsigned_at(middle, reach) < reach ? 0 : -1;
+    const auto at = static_cast<std::int64_t>(k);
+    const std::int64_t corner =
+        at % n.x + corners.x * (at / n.x % n.y + corners.y * (at / n.x / n.y));
+    // From the corner of a cell to its middle it is half a diagonal.
+    const bool is_far = std::abs(made.coarse[corner]) > reach + slack * std::sqrt(0.75) * cell;
+    made.brick[k] = !is_far && distances.unsigned_at(place(at, n, 0.5), reach) < reach ? 0 : -1;
   }
   std::vector<std::int64_t> with_brick;
   for (std::size_t k = 0; k < made.brick.size(); ++k) {

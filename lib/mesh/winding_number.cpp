@@ -129,8 +129,19 @@ double WindingNumber::operator()(Vec3d point, Offset* work) const {
   return near / (2 * std::numbers::pi) + far / (4 * std::numbers::pi);
 }
 
-double WindingNumber::distance(Vec3d point, double most) const {
+double WindingNumber::distance(Vec3d point, double most, Index* nearest_triangle) const {
   if (nodes_.empty()) return most;
+  double nearest = most;
+  Index unused = -1;
+  Index& at = nearest_triangle ? *nearest_triangle : unused;
+  const auto look = [&](Index t) {
+    const Corners& c = corners_[t];
+    const double found = norm(nearest_on_triangle(point, c.a, c.b, c.c) - point);
+    if (!(found < nearest)) return;
+    nearest = found;
+    at = t;
+  };
+  if (at >= 0) look(at);
   /// A node to visit, and the least distance of its triangles.
   struct Waiting {
     Index node;
@@ -140,7 +151,6 @@ double WindingNumber::distance(Vec3d point, double most) const {
     const Node& node = nodes_[index];
     return Waiting{index, norm(node.centre - point) - node.radius / accuracy_};
   };
-  double nearest = most;
   Waiting stack[64];
   int depth = 0;
   stack[depth++] = waiting(0);
@@ -155,10 +165,7 @@ double WindingNumber::distance(Vec3d point, double most) const {
       stack[depth++] = near;
       continue;
     }
-    for (Index t = node.first; t < node.first + node.count; ++t) {
-      const Corners& c = corners_[t];
-      nearest = std::min(nearest, norm(nearest_on_triangle(point, c.a, c.b, c.c) - point));
-    }
+    for (Index t = node.first; t < node.first + node.count; ++t) look(t);
   }
   return nearest;
 }

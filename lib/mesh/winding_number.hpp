@@ -28,7 +28,9 @@ class WindingNumber {
   ///   visited
   double operator()(Vec3d point, Offset* work = nullptr) const;
   /// The distance from a point to the nearest triangle [m], or `most` where it is larger.
-  double distance(Vec3d point, double most) const;
+  /// @param nearest if given, is a triangle likely to be near, or -1, and receives the nearest one;
+  ///   the distance is the same for any
+  double distance(Vec3d point, double most, Index* nearest = nullptr) const;
   static constexpr Offset angle_work = 8;  ///< Cost of a solid angle, in expansions of groups.
 
  private:
