@@ -66,11 +66,12 @@ std::pair<Index, double> nearest_in(const Model& model, const Part& part, Vec3d 
 Deepest deepest_of(const Model& model) {
   Deepest found;
   const ContactLayer& layer = model.contact;
-  const auto unmoved = [](Index) { return Vec3d{}; };
+  const std::vector<LayerGroup> groups = groups_of(model, layer);
+  const PlacedLayer placed(model, groups, [](Index) { return Vec3d{}; });
   for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     const ObstacleStep rest = obstacle.step_from(0, 0);
-    for_each_gap(model, obstacle, rest, unmoved, [&](std::size_t k, Vec3d, const Gap& gap) {
+    placed.for_each_inside(obstacle, rest, [&](std::size_t k, Vec3d, const Gap& gap) {
       if (-gap.distance > found.depth) found = {-gap.distance, layer.phyxels[k], o};
     });
     if (obstacle.hollow || !obstacle.is_bounded()) continue;

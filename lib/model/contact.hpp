@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "model/contact_groups.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/obstacles.hpp"
 
@@ -14,23 +15,44 @@ namespace phyxel {
 /// The obstacles of a scene, in its order.
 std::vector<Obstacle> obstacles_of(const Scene& scene);
 
-/// Calls each(k, x, gap) for the phyxels of a contact layer: k counts them, x is where each is [m],
-/// and gap that of its body's surface there to an obstacle.
-/// @param displacement returns that of a phyxel [m]
-template <class Displacement, class Each>
-void for_each_gap(const Model& model, const Obstacle& obstacle, const ObstacleStep& at,
-                  Displacement&& displacement, Each&& each) {
-  const ContactLayer& layer = model.contact;
-  ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
-    for (std::size_t k = 0; k < layer.phyxels.size(); ++k) {
-      const Index i = layer.phyxels[k];
-      const Vec3d x = model.position[i] + displacement(i);
-      Gap gap = gap_to(shape, at, x);
-      gap.distance -= layer.offset[k];
-      each(k, x, gap);
+/// The contact layer of a model at some displacements.
+template <class Displacement>
+class PlacedLayer {
+ public:
+  /// @param groups of the model's contact layer. @param displacement returns that of a phyxel [m].
+  /// All must outlive this.
+  PlacedLayer(const Model& model, std::span<const LayerGroup> groups, Displacement displacement)
+      : model_(model), groups_(groups), displacement_(displacement) {
+    for (const LayerGroup& group : groups) {
+      boxes_.push_back(box_of_group(model, group, displacement));
     }
-  });
-}
+  }
+
+  /// Calls each(k, x, gap) for the phyxels inside an obstacle, ascending: k counts the phyxels of
+  /// the layer, x is where each is [m], and gap that of its body's surface there to the obstacle.
+  template <class Each>
+  void for_each_inside(const Obstacle& obstacle, const ObstacleStep& at, Each&& each) const {
+    const ContactLayer& layer = model_.contact;
+    ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
+      for (std::size_t g = 0; g < groups_.size(); ++g) {
+        if (is_clear_of(obstacle, at, boxes_[g], groups_[g].offset)) continue;
+        for (std::size_t k = groups_[g].begin; k < groups_[g].end; ++k) {
+          const Index i = layer.phyxels[k];
+          const Vec3d x = model_.position[i] + displacement_(i);
+          Gap gap = gap_to(shape, at, x);
+          gap.distance -= layer.offset[k];
+          if (gap.distance < 0) each(k, x, gap);
+        }
+      }
+    });
+  }
+
+ private:
+  const Model& model_;
+  std::span<const LayerGroup> groups_;
+  Displacement displacement_;
+  std::vector<Box> boxes_;
+};
 
 /// Refuses a body that cannot touch anything: one without a surface.
 /// @throws InputError naming the body and what is allowed

@@ -27,7 +27,10 @@ PlacedObstacles obstacles_over(const Model& model, double time, double span) {
 }
 
 ContactPenalty::ContactPenalty(const Model& model)
-    : model_(model), blocks_(model.contact.phyxels.size()), bodies_(model) {
+    : model_(model),
+      groups_(groups_of(model, model.contact)),
+      blocks_(model.contact.phyxels.size()),
+      bodies_(model) {
   for (const Index i : model.contact.phyxels) {
     const double c = pressure_wave_speed(part_of(model, i).material);
     const double crossings = c / model.neighbourhood.support[i];
@@ -37,12 +40,11 @@ ContactPenalty::ContactPenalty(const Model& model)
 
 template <class Each>
 void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const {
-  const auto displacement = [&](Index i) { return u[i]; };
+  const PlacedLayer layer(model_, groups_, [&](Index i) { return u[i]; });
   for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
-    for_each_gap(model_, model_.obstacles[o], at[o], displacement,
-                 [&](std::size_t k, Vec3d x, const Gap& gap) {
-                   if (gap.distance < 0) each(k, o, penalty_force(gap, stiffness_[k]), x);
-                 });
+    layer.for_each_inside(model_.obstacles[o], at[o], [&](std::size_t k, Vec3d x, const Gap& gap) {
+      each(k, o, penalty_force(gap, stiffness_[k]), x);
+    });
   }
 }
 

@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "model/contact_groups.hpp"
 #include "model/owned_vectors.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/contact_penalty.hpp"
@@ -77,6 +78,7 @@ class ContactPenalty {
   void for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const;
 
   const Model& model_;
+  std::vector<LayerGroup> groups_;
   std::vector<double> stiffness_;  // [N/m], shape [layer]
   std::vector<Mat3d> blocks_;      // [N/m], shape [layer]
   double normal_forces_ = 0;       // squared [N²], of this rank

@@ -128,18 +128,26 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   return rates;
 }
 
-/// Depth of the deepest phyxel of a contact layer in an obstacle [m], 0 if none is inside. Of a
-/// share: collective.
-double depth_in(const Model& model, std::size_t o, const Solver& solver, const State& state) {
-  const Obstacle& obstacle = model.obstacles[o];
-  const ObstacleStep here = solver.method() == Method::equilibrium
-                                ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)[o]
-                                : obstacle.step_from(solver.time(), 0);
-  double deepest = 0;
-  for_each_gap(
-      model, obstacle, here, [&](Index i) { return state.displacement[i]; },
-      [&](std::size_t, Vec3d, const Gap& gap) { deepest = std::max(deepest, -gap.distance); });
-  return model.share ? model.share->communicator->largest(deepest) : deepest;
+/// Depths of the deepest phyxel of the contact layer in each obstacle [m], 0 if none is inside. Of
+/// a share: collective.
+std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver,
+                                        const State& state) {
+  std::vector<double> depths(model.obstacles.size());
+  if (depths.empty()) return depths;
+  const PlacedObstacles after = solver.method() == Method::equilibrium
+                                    ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
+                                    : PlacedObstacles{};
+  const std::vector<LayerGroup> groups = groups_of(model, model.contact);
+  const PlacedLayer layer(model, groups, [&](Index i) { return state.displacement[i]; });
+  for (std::size_t o = 0; o < depths.size(); ++o) {
+    const Obstacle& obstacle = model.obstacles[o];
+    double& deepest = depths[o];
+    layer.for_each_inside(
+        obstacle, after.empty() ? obstacle.step_from(solver.time(), 0) : after[o],
+        [&](std::size_t, Vec3d, const Gap& gap) { deepest = std::max(deepest, -gap.distance); });
+    if (model.share) deepest = model.share->communicator->largest(deepest);
+  }
+  return depths;
 }
 
 /// The first part of a body of the scene.
@@ -245,11 +253,12 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
     reading.impact_loss = sums[ContactTerms::impact_loss].value();
     readings.push_back(std::move(reading));
   };
+  const std::vector<double> depths = depths_in_obstacles(model, solver, state);
   for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     add({.obstacle = obstacle.name,
          .shape = shape_name(obstacle),
-         .depth = depth_in(model, o, solver, state),
+         .depth = depths[o],
          .place = obstacle.place});
   }
   for (std::size_t b = 0; b < model.body_contact.distances.size(); ++b) {

@@ -2,10 +2,14 @@
 #pragma once
 
 #include <algorithm>
+#include <map>
+#include <set>
 #include <span>
 #include <vector>
 
 #include "mesh/distance_field.hpp"
+#include "model/box_overlaps.hpp"
+#include "model/contact_groups.hpp"
 #include "model/parts.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/obstacles.hpp"
@@ -48,7 +52,13 @@ class StepContacts {
         threads_(threads),
         sums_(ContactTerms::count * model.obstacles.size()),
         free_(free_axes_of_layer(model)),
-        before_(model.contact.phyxels.size()) {}
+        before_(model.contact.phyxels.size()),
+        groups_(groups_of(model, model.contact)),
+        near_(groups_.size()) {
+    for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
+      if (!model.obstacles[o].motion.stands_still()) moving_.push_back(o);
+    }
+  }
 
   /// Prepares for a step, which has not changed velocities yet.
   /// @param velocity_of returns the velocity of a phyxel [m/s]
@@ -58,11 +68,12 @@ class StepContacts {
     if (dt != dt_) {
       dt_ = dt;
       inertia_ = inertia_of_layer(model_, dt);
+      steps_.clear();
+      for (const Obstacle& obstacle : model_.obstacles) {
+        steps_.push_back(obstacle.step_from(time, dt));
+      }
     }
-    steps_.clear();
-    for (const Obstacle& obstacle : model_.obstacles) {
-      steps_.push_back(obstacle.step_from(time, dt));
-    }
+    for (const std::size_t o : moving_) steps_[o] = model_.obstacles[o].step_from(time, dt);
 #pragma omp parallel for schedule(static) num_threads(threads_here())
     for (std::size_t k = 0; k < before_.size(); ++k) {
       before_[k] = velocity_of(model_.contact.phyxels[k]);
@@ -73,26 +84,20 @@ class StepContacts {
   /// @param get,set return and replace the state of a phyxel
   template <class IsMeant, class Get, class Set>
   void keep_out(IsMeant&& is_meant, Get&& get, Set&& set) {
-    for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
-      const Obstacle& obstacle = model_.obstacles[o];
-      const std::span<ExactSum> all =
-          std::span(sums_).subspan(o * ContactTerms::count, ContactTerms::count);
-      ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
+    if (model_.obstacles.empty()) return;
 #pragma omp parallel num_threads(threads_here())
-        {
-          StepSums own(ContactTerms::count);
-          bool touches = false;
+    {
+      std::map<std::size_t, StepSums> own;  // of the obstacles that this thread's phyxels touch
 #pragma omp for schedule(static) nowait
-          for (std::size_t k = 0; k < before_.size(); ++k) {
-            const Index i = model_.contact.phyxels[k];
-            if (is_meant(i) && keep_out_of(shape, steps_[o], k, i, get, set, own)) touches = true;
-          }
-          if (touches) {
+      for (std::size_t g = 0; g < groups_.size(); ++g) keep_group_out(g, is_meant, get, set, own);
+      if (!own.empty()) {
 #pragma omp critical(phyxel_contact_sums)
-            for (int s = 0; s < ContactTerms::count; ++s) all[s].add(own[s]);
+        for (const auto& [o, sums] : own) {
+          for (int s = 0; s < ContactTerms::count; ++s) {
+            sums_[o * ContactTerms::count + s].add(sums[s]);
           }
         }
-      });
+      }
     }
   }
   /// The sums so far, obstacle by obstacle (`ContactTerms`).
@@ -100,8 +105,10 @@ class StepContacts {
   /// Bytes of its arrays.
   std::size_t bytes() const {
     std::size_t distances = 0;
+    std::set<const DistanceArrays*> counted;
     for (const Obstacle& obstacle : model_.obstacles) {
-      if (obstacle.distances) distances += obstacle.distances->bytes();
+      const bool is_new = obstacle.distances && counted.insert(obstacle.distances.get()).second;
+      if (is_new) distances += obstacle.distances->bytes();
     }
     return distances + sums_.size() * sizeof(ExactSum) +
            (free_.size() + before_.size()) * sizeof(Vec3d) + inertia_.size() * sizeof(double);
@@ -111,9 +118,67 @@ class StepContacts {
   int threads_here() const {
     return std::clamp(static_cast<int>(before_.size() / 1000), 1, threads_);
   }
+  /// The obstacles that a group may touch while it stays in a box: those that stand still beside
+  /// that box, and all that move.
+  struct NearObstacles {
+    Box box = no_box;
+    std::vector<std::size_t> obstacles;  // ascending
+  };
+  /// Finds the obstacles that a group may touch anew, with a margin for the next steps.
+  void find_near(std::size_t g, const Box& box) {
+    const LayerGroup& group = groups_[g];
+    NearObstacles& near = near_[g];
+    near.box = grown(box, 0.5 * (box.extent() + group.support));
+    near.obstacles = moving_;
+    for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
+      const Obstacle& obstacle = model_.obstacles[o];
+      if (!obstacle.motion.stands_still()) continue;
+      if (!is_clear_of(obstacle, steps_[o], near.box, group.offset)) near.obstacles.push_back(o);
+    }
+    std::sort(near.obstacles.begin(), near.obstacles.end());
+  }
+  template <class IsMeant, class Get, class Set>
+  void keep_group_out(std::size_t g, IsMeant&& is_meant, Get&& get, Set&& set,
+                      std::map<std::size_t, StepSums>& sums) {
+    const LayerGroup& group = groups_[g];
+    const std::vector<Index>& layer = model_.contact.phyxels;
+    NearObstacles& near = near_[g];
+    Box box;
+    const auto find_box = [&] {
+      box = no_box;
+      for (std::size_t k = group.begin; k < group.end; ++k) {
+        const Index i = layer[k];
+        if (is_meant(i)) extend(box, model_.position[i] + get(i).displacement);
+      }
+      if (!is_within(box, near.box)) find_near(g, box);
+    };
+    find_box();
+    for (std::size_t at = 0; at < near.obstacles.size(); ++at) {
+      const std::size_t o = near.obstacles[at];
+      const Obstacle& obstacle = model_.obstacles[o];
+      if (is_clear_of(obstacle, steps_[o], box, group.offset)) continue;
+      StepSums* own = nullptr;
+      ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
+        for (std::size_t k = group.begin; k < group.end; ++k) {
+          ContactTerms terms;
+          if (!is_meant(layer[k]) || !keep_out_of(shape, steps_[o], k, layer[k], get, set, terms)) {
+            continue;
+          }
+          if (!own) own = &sums.try_emplace(o, ContactTerms::count).first->second;
+          for (int s = 0; s < ContactTerms::count; ++s) (*own)[s].add(terms.value[s]);
+        }
+      });
+      if (!own) continue;
+      // What has been pushed out of this obstacle may have been led into another one.
+      find_box();
+      at = static_cast<std::size_t>(
+          std::upper_bound(near.obstacles.begin(), near.obstacles.end(), o) -
+          near.obstacles.begin() - 1);
+    }
+  }
   template <class Shape, class Get, class Set>
   bool keep_out_of(const Shape& shape, const ObstacleStep& step, std::size_t k, Index i, Get&& get,
-                   Set&& set, StepSums& sums) const {
+                   Set&& set, ContactTerms& terms) const {
     const Touched now = get(i);
     TouchingPoint point{model_.position[i] + now.displacement,
                         now.velocity,
@@ -121,10 +186,8 @@ class StepContacts {
                         free_[k],
                         model_.contact.offset[k],
                         inertia_[k]};
-    ContactTerms terms;
     if (!touch(shape, step, point, terms)) return false;
     set(i, {now.displacement + step.dt * (point.velocity - now.velocity), point.velocity});
-    for (int s = 0; s < ContactTerms::count; ++s) sums[s].add(terms.value[s]);
     return true;
   }
 
@@ -135,6 +198,9 @@ class StepContacts {
   std::vector<Vec3d> before_;        // velocities at the start of the step [m/s], shape [layer]
   std::vector<double> inertia_;      // [kg/s], shape [layer]
   std::vector<ObstacleStep> steps_;  // of the present step
+  std::vector<LayerGroup> groups_;
+  std::vector<NearObstacles> near_;  // of each group
+  std::vector<std::size_t> moving_;  // obstacles that do not stand still
   double dt_ = 0;                    // of `inertia_` [s]
 };
 
