@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -165,10 +166,14 @@ class DeviceBodyContacts {
       : m_(model), points_(model.model()) {
     if (!acts()) return;
     const BodyContact& contact = m_.model().body_contact;
-    std::vector<DistanceField> fields;
-    for (const auto& distances : contact.distances) {
-      distances_.push_back(distances ? DeviceDistances(*distances, name) : DeviceDistances());
-      fields.push_back(distances_.back().view());
+    std::vector<PlacedDistances> fields;
+    std::map<const DistanceArrays*, DistanceField> views;  // copies of a body share one
+    for (const BodyDistances& distances : contact.distances) {
+      const auto [view, is_new] = views.try_emplace(distances.arrays.get());
+      if (is_new && distances) {
+        view->second = distances_.emplace_back(*distances.arrays, name).view();
+      }
+      fields.push_back(distances.view(view->second));
     }
     fields_ = sent(fields, name);
     layer_place_ = sent(places_of(contact.layer.phyxels), name);
@@ -378,8 +383,8 @@ class DeviceBodyContacts {
   ContactWatch watch_{4};
   double dt_ = 0;  // [s]
   DeviceSums sums_;
-  std::vector<DeviceDistances> distances_;  // of each body
-  DeviceArray<DistanceField> fields_;
+  std::vector<DeviceDistances> distances_;  // of bodies that are no copies of each other
+  DeviceArray<PlacedDistances> fields_;
   DeviceArray<Index> layer_place_;
   DeviceArray<Vec3<double>> layer_position_, layer_found_;
   DeviceArray<unsigned long long> squares_;

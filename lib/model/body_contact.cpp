@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mesh/distance_field.hpp"
+#include "mesh/rigid_copy.hpp"
 #include "mesh/surface_topology.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/contact.hpp"
@@ -86,11 +87,38 @@ std::shared_ptr<const DistanceArrays> distances_of(const BodyRequest& request, S
 }
 
 /// The box of the phyxels of a body's surface at rest, with a margin.
-Box box_of(const DistanceArrays& distances) {
-  const DistanceField& field = distances.shape;
+Box box_of(const BodyDistances& distances) {
+  const DistanceField& field = distances.arrays->shape;
   const double cell = DistanceField::edge * field.spacing;
-  const Vec3d size{cell * field.count.x, cell * field.count.y, cell * field.count.z};
-  return {field.low, field.low + size};
+  std::vector<Vec3d> corners;
+  for (int c = 0; c < 8; ++c) {
+    const Vec3d size{cell * field.count.x * (c & 1), cell * field.count.y * (c >> 1 & 1),
+                     cell * field.count.z * (c >> 2)};
+    corners.push_back(distances.turn * (field.low + size) + distances.place);
+  }
+  return box_around(corners);
+}
+
+/// The first of some bodies that are copies of each other.
+struct Original {
+  std::size_t body = 0;
+  Surface surface;
+  LayerSupports supports;  ///< Those of all copies.
+};
+
+/// The rigid motion from a body to its copy. Copies have phyxels as far apart, but for rounding and
+/// for what clouds of another rotation differ by.
+std::optional<RigidMotion> motion_to(const Original& original, const Surface& surface,
+                                     const LayerSupports& supports) {
+  const auto are_alike = [](double a, double b) {
+    constexpr double tolerance = 0.01;
+    return std::abs(a - b) <= tolerance * b;
+  };
+  if (!are_alike(supports.least, original.supports.least) ||
+      !are_alike(supports.most, original.supports.most)) {
+    return std::nullopt;
+  }
+  return rigid_motion_between(original.surface, surface);
 }
 
 /// A phyxel that is inside another body.
@@ -103,17 +131,17 @@ struct Overlap {
 Overlap deepest_overlap(const Model& model) {
   const BodyContact& contact = model.body_contact;
   const std::vector<Box> boxes = tabulated(contact.distances.size(), [&](std::size_t b) {
-    return contact.distances[b] ? box_of(*contact.distances[b]) : Box{};
+    return contact.distances[b] ? box_of(contact.distances[b]) : Box{};
   });
   const std::vector<std::vector<Index>> partners = partners_of_bodies(contact, boxes);
   Overlap found;
   // A body whose deepest place is inside another one, as that of a body twice at the same place.
   for (const Part& part : model.parts) {
     if (part.begin == part.owned_end() || !contact.distances[part.body]) continue;
-    const Vec3d middle = contact.distances[part.body]->deepest;
+    const Vec3d middle = contact.distances[part.body].deepest();
     for (const Index other : partners[part.body]) {
       if (other == part.body) continue;
-      const double depth = -contact.distances[other]->view().gap(middle).distance;
+      const double depth = -contact.distances[other].view().gap(middle).distance;
       if (depth > found.depth) found = {depth, part.begin, other};
     }
   }
@@ -122,9 +150,8 @@ Overlap deepest_overlap(const Model& model) {
     const Index body = part_of(model, i).body;
     for (const Index other : partners[body]) {
       if (other == body || !contains(boxes[other], model.position[i])) continue;
-      const DistanceArrays& distances = *contact.distances[other];
       const double depth =
-          contact.layer.offset[k] - distances.view().gap(model.position[i]).distance;
+          contact.layer.offset[k] - contact.distances[other].view().gap(model.position[i]).distance;
       if (depth > found.depth) found = {depth, i, other};
     }
   }
@@ -132,6 +159,10 @@ Overlap deepest_overlap(const Model& model) {
 }
 
 }  // namespace
+
+PlacedDistances BodyDistances::view() const { return view(arrays->view()); }
+
+Vec3d BodyDistances::deepest() const { return turn * arrays->deepest + place; }
 
 const ContactLaw* BodyContact::law_of(Index a, Index b) const {
   if (a == b && !self) return nullptr;
@@ -185,10 +216,32 @@ std::vector<LayerSupports> add_body_layer(Model& model, const Scene& scene,
 
 void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSupports> supports,
                        const std::function<Surface(std::size_t body)>& surface_of) {
-  model.body_contact.distances.resize(supports.size());
+  std::vector<BodyDistances>& distances = model.body_contact.distances;
+  distances.resize(supports.size());
+  std::vector<Original> originals;
+  std::vector<std::size_t> original_of(supports.size());
   for (std::size_t b = 0; b < supports.size(); ++b) {
     if (!(supports[b].most > 0)) continue;  // it touches nothing
-    model.body_contact.distances[b] = distances_of(scene.bodies[b], surface_of(b), supports[b]);
+    Surface surface = surface_of(b);
+    std::size_t o = 0;
+    for (; o < originals.size(); ++o) {
+      const std::optional<RigidMotion> motion = motion_to(originals[o], surface, supports[b]);
+      if (!motion) continue;
+      LayerSupports& all = originals[o].supports;
+      all = {std::min(all.least, supports[b].least), std::max(all.most, supports[b].most)};
+      distances[b] = {nullptr, motion->turn, motion->place};
+      break;
+    }
+    if (o == originals.size()) originals.push_back({b, std::move(surface), supports[b]});
+    original_of[b] = o;
+  }
+  std::vector<std::shared_ptr<const DistanceArrays>> made;
+  for (Original& original : originals) {
+    made.push_back(
+        distances_of(scene.bodies[original.body], std::move(original.surface), original.supports));
+  }
+  for (std::size_t b = 0; b < supports.size(); ++b) {
+    if (supports[b].most > 0) distances[b].arrays = made[original_of[b]];
   }
 }
 

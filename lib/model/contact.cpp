@@ -86,13 +86,23 @@ Deepest deepest_of(const Model& model) {
   return found;
 }
 
-/// Finds the distances from the surface of a mesh, as finely as phyxels are spaced.
+/// Finds the distances from the surface of a mesh, as finely as phyxels are spaced. Obstacles of
+/// the same surface share them.
+/// @param earlier obstacles that have theirs
 /// @param support the smallest one of phyxels that touch [m]
-void set_field_for(Obstacle& obstacle, double support, std::vector<std::string>& warnings) {
+void set_field_for(Obstacle& obstacle, std::span<const Obstacle> earlier, double support,
+                   std::vector<std::string>& warnings) {
   const double extent = box_around(obstacle.surface->position).extent();
   const double wanted = std::min(nodes_over_support * support,
                                  (support < HUGE_VAL ? std::max(extent, support) : extent) / 32);
-  const double made = obstacle.set_field(wanted, support < HUGE_VAL ? support : 0);
+  const auto same = std::find_if(earlier.begin(), earlier.end(), [&](const Obstacle& other) {
+    return other.surface && (other.surface == obstacle.surface ||
+                             (other.surface->position == obstacle.surface->position &&
+                              other.surface->triangle == obstacle.surface->triangle));
+  });
+  const double made = same != earlier.end()
+                          ? obstacle.share_field(*same)
+                          : obstacle.set_field(wanted, support < HUGE_VAL ? support : 0);
   if (made <= 1.01 * wanted) return;
   warnings.push_back(fmt::format(
       "the surface of obstacle \"{}\" is rounded to {:.3g} m, coarser than the {:.3g} m that the "
@@ -228,8 +238,10 @@ void set_fields(Model& model) {
     least = model.share->communicator->smallest(least);
     support = model.share->communicator->largest(support);
   }
-  for (Obstacle& obstacle : model.obstacles) {
-    if (obstacle.surface) set_field_for(obstacle, least, model.warnings);
+  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
+    Obstacle& obstacle = model.obstacles[o];
+    const std::span earlier = std::span(model.obstacles).first(o);
+    if (obstacle.surface) set_field_for(obstacle, earlier, least, model.warnings);
     const double radius = obstacle.inner_radius();
     if (radius >= support) continue;
     model.warnings.push_back(fmt::format(

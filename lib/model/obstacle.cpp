@@ -116,6 +116,13 @@ double Obstacle::set_field(double spacing, double band) {
   return form.field.spacing;
 }
 
+double Obstacle::share_field(const Obstacle& other) {
+  surface = other.surface;
+  distances = other.distances;
+  form.field = other.form.field;
+  return form.field.spacing;
+}
+
 bool Obstacle::is_bounded() const {
   return surface ||
          ObstacleShapes::with(form, [](const auto& s) { return std::size(s.lengths) > 0; });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "mesh/distance_field.hpp"
@@ -12,8 +13,8 @@ BodyContacts::BodyContacts(const Model& model, int threads)
     : model_(model), threads_(threads), points_(model) {
   if (!acts()) return;
   sums_.resize(ContactTerms::count * model.body_contact.distances.size());
-  for (const auto& distances : model.body_contact.distances) {
-    fields_.push_back(distances ? distances->view() : DistanceField{});
+  for (const BodyDistances& distances : model.body_contact.distances) {
+    fields_.push_back(distances ? distances.view() : PlacedDistances{});
   }
 }
 
@@ -145,8 +146,10 @@ void BodyContacts::add_to_sums(std::size_t p, const PointForces& forces) {
 std::size_t BodyContacts::bytes() const {
   if (!acts()) return 0;
   std::size_t distances = 0;
-  for (const auto& of_body : model_.body_contact.distances) {
-    if (of_body) distances += of_body->bytes();
+  std::set<const DistanceArrays*> counted;
+  for (const BodyDistances& of_body : model_.body_contact.distances) {
+    const bool is_new = of_body && counted.insert(of_body.arrays.get()).second;
+    if (is_new) distances += of_body.arrays->bytes();
   }
   return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) +
          found_at_.size() * sizeof(Vec3d) +

@@ -199,7 +199,7 @@ class BodyContacts {
   const Model& model_;
   int threads_;
   TouchingPoints points_;
-  std::vector<DistanceField> fields_;  // of each body of the scene
+  std::vector<PlacedDistances> fields_;  // of each body of the scene
   StepSums sums_;
   std::vector<SurfaceMotion> motion_;       // shape [points]
   std::vector<Vec3d> velocity_;             // shape [points]

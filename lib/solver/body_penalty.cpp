@@ -23,7 +23,7 @@ BodyPenalty::BodyPenalty(const Model& model)
     : model_(model), points_(model), modulus_(model.body_contact.distances.size()) {
   if (empty()) return;
   for (const auto& distances : model.body_contact.distances) {
-    fields_.push_back(distances ? distances->view() : DistanceField{});
+    fields_.push_back(distances ? distances.view() : PlacedDistances{});
   }
   for (const Part& part : model.parts) {
     const double c = pressure_wave_speed(part.material);

@@ -40,7 +40,7 @@ struct ContactPasses {
   /// Rows that belong to each point, not in parts.
   const Offset* rows_from_start = nullptr;
   const Index* rows_from = nullptr;
-  const DistanceField* field = nullptr;  ///< Of each body of the scene.
+  const PlacedDistances* field = nullptr;  ///< Of each body of the scene.
   SurfaceTouch* touch = nullptr;         ///< Of each row.
   SurfaceResponse* response = nullptr;   ///< Of each row.
   SurfaceForce* force = nullptr;         ///< Of each row.

@@ -34,7 +34,7 @@ std::vector<char> spread(const ContactRows& rows, std::vector<char>& chosen) {
 
 /// Sets where a phyxel's distance from other bodies is looked up, and the level of its surface,
 /// from the distances of places around it from its own body's surface.
-void look_around(SurfaceSite& site, const DistanceField& own) {
+void look_around(SurfaceSite& site, const PlacedDistances& own) {
   const double spacing = 0.45 * site.range;
   const auto slope = [&](Vec3d way) {
     return (own.gap(site.rest + spacing * way).distance -
@@ -67,7 +67,7 @@ TouchingPoints::TouchingPoints(const Model& model) : model_(model) {
                      .area = model.volume[i] / range,
                      .offset = layer.offset[k],
                      .range = range};
-    look_around(site, model.body_contact.distances[part_of(model, i).body]->view());
+    look_around(site, model.body_contact.distances[part_of(model, i).body].view());
     layer_.push_back(site);
   }
   if (model.share) least = model.share->communicator->smallest(least);

@@ -139,6 +139,9 @@ struct Obstacle {
   /// @param band distance from the surface up to which they are as near [m]
   /// @returns the spacing of the nodes [m], or 0 for other shapes
   double set_field(double spacing, double band);
+  /// Shares the surface of an equal mesh, and the distances from it, with another obstacle.
+  /// @returns the spacing of the nodes [m]
+  double share_field(const Obstacle& other);
   /// True if it has an end on all sides, as all shapes have but planes.
   bool is_bounded() const;
   /// Radius of the largest ball inside what bodies cannot enter [m]; infinite for a plane, and for
@@ -158,6 +161,21 @@ struct ContactLayer {
   std::vector<double> offset;  ///< Distance of each from its body's surface [m]; 0: it lies on it.
 };
 
+/// Distances from the surface of a body at rest. Bodies that are copies of each other share the
+/// arrays.
+struct BodyDistances {
+  std::shared_ptr<const DistanceArrays> arrays;  ///< Null for a body that touches no other.
+  Mat3d turn = identity<double>();               ///< Rotation of the arrays' field into place.
+  Vec3d place;                                   ///< Where the field's origin is in place [m].
+
+  explicit operator bool() const { return arrays != nullptr; }
+  /// A view of the arrays, or of `field`, a copy of them on a device, in place.
+  PlacedDistances view() const;
+  PlacedDistances view(const DistanceField& field) const { return {field, turn, place}; }
+  /// The place of the arrays' deepest point [m].
+  Vec3d deepest() const;
+};
+
 /// How the bodies of a scene touch each other.
 struct BodyContact {
   /// Two bodies of the scene with a law of their own.
@@ -170,9 +188,8 @@ struct BodyContact {
   bool all = true;          ///< True if other pairs touch, too.
   bool self = false;        ///< True if parts of one body touch each other, too.
   int sweeps = 1;           ///< How often contact is resolved in each step.
-  /// Distances from the surface of each body at rest, by the number of the body; null for bodies
-  /// that touch no other. Empty in scenes without such contact.
-  std::vector<std::shared_ptr<const DistanceArrays>> distances;
+  /// Those of each body, by its number. Empty in scenes without such contact.
+  std::vector<BodyDistances> distances;
   /// The phyxels by which bodies touch each other, held and moved ones, too.
   ContactLayer layer;
 

@@ -49,6 +49,20 @@ TEST_F(MeshObstacles, WithFlatFacesActAsBoxes) {
   EXPECT_LE(norm(box.momentum() - same.momentum()), 1e-4);
 }
 
+TEST_F(MeshObstacles, OfOneSurfaceShareItsDistances) {
+  const Surface cube = test::box({-0.5, -0.5, -0.15}, {0.5, 0.5, 0.15});
+  const Scene scene =
+      parse_scene(dropped(mesh(cube, "translation = [0, 0, -0.3]\n") +
+                          mesh(cube, "rotation = [0, 0, 30]\ntranslation = [0, 0, -1.3]\n") +
+                          mesh(cube, "scale = 1.5\ntranslation = [0, 0, -2.3]\n")),
+                  "scene.toml");
+  const Model model = build_model(scene);
+  EXPECT_EQ(model.obstacles[1].distances, model.obstacles[0].distances);
+  EXPECT_EQ(model.obstacles[1].surface, model.obstacles[0].surface);
+  EXPECT_EQ(model.obstacles[1].form.field.fine, model.obstacles[0].form.field.fine);
+  EXPECT_NE(model.obstacles[2].distances, model.obstacles[0].distances);
+}
+
 TEST_F(MeshObstacles, ThatAreRoundActAsSpheres) {
   const std::string more =
       "friction = 0.3\ntranslation = [0.02, 0, -0.4]\n[obstacle.motion]\nvelocity = [0, 0.3, 0]\n"

@@ -184,7 +184,7 @@ template <class Threads, class SiteOf, class MotionOf>
 PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& site,
                                      const SurfaceMotion& point, const Offset* list,
                                      SiteOf&& site_of, MotionOf&& motion_of,
-                                     const DistanceField& field, double least, double reach,
+                                     const PlacedDistances& field, double least, double reach,
                                      SurfaceShare* shares) {
   SurfaceTouch touch;
   threads.each(list, [&](Offset k) { shares[k] = {}; });

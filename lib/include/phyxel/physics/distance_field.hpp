@@ -95,4 +95,17 @@ struct DistanceField {
   }
 };
 
+/// A field of distances that has been turned and moved from where it was made.
+struct PlacedDistances {
+  DistanceField field;
+  Mat3<double> turn = identity<double>();  ///< The rotation into place.
+  Vec3<double> place{};                    ///< Where the origin of the field has gone [m].
+
+  /// The distance of a point from the surface. Beyond the field's grid it is a lower bound.
+  PHYXEL_HD Gap gap(Vec3<double> x) const {
+    const Gap gap = field.gap(transpose(turn) * (x - place));
+    return {gap.distance, turn * gap.normal};
+  }
+};
+
 }  // namespace phyxel
