@@ -10,7 +10,7 @@
 
 namespace phyxel {
 BodyContacts::BodyContacts(const Model& model, int threads)
-    : model_(model), threads_(threads), points_(model) {
+    : model_(model), threads_(threads), points_(model), watch_(model, threads) {
   if (!acts()) return;
   sums_.resize(ContactTerms::count * model.body_contact.distances.size());
   for (const BodyDistances& distances : model.body_contact.distances) {
@@ -18,38 +18,22 @@ BodyContacts::BodyContacts(const Model& model, int threads)
   }
 }
 
-bool ContactWatch::look(const Model& model, double moved, double fastest, double skin, double dt) {
-  if (model.share) {
-    moved = model.share->communicator->largest(moved);
-    fastest = model.share->communicator->largest(fastest);
-  }
-  // Speeds may double until the next look.
-  const double way = 2 * fastest * dt, most = 0.5 * skin;
-  const bool is_late = generation_ == 0 || dt != dt_ || moved + way > most;
-  if (is_late) {
-    moved = 0;
-    ++generation_;
-  }
-  dt_ = dt;
-  const double steps = (most - moved) / std::max(way, 1e-300);
-  left_ = static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(rarest_)));
-  return is_late;
-}
-
-void BodyContacts::look(std::span<const SurfaceState> states, double dt) {
-  const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
-  std::vector<Vec3d> now(layer.size());
-  double moved = 0, fastest = 0;
-  for (std::size_t k = 0; k < layer.size(); ++k) {
-    now[k] = model_.position[layer[k]] + states[k].displacement;
-    fastest = std::max(fastest, norm(states[k].velocity));
-    if (!found_at_.empty()) moved = std::max(moved, norm(now[k] - found_at_[k]));
-  }
-  if (!watch_.look(model_, moved, fastest, points_.skin(), dt)) return;
-  found_at_ = std::move(now);
-  points_.find(found_at_, dt);
-  motion_.assign(points_.sites().size(), {});
-  velocity_.assign(points_.sites().size(), {});
+void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
+  points_.find(position, dt);
+  watch_.found(std::move(position), points_.skin());
+  const std::size_t points = points_.sites().size(), rows = points_.rows().size();
+  motion_.assign(points, {});
+  velocity_.assign(points, {});
+  touches_.assign(rows, {});
+  is_inside_.assign(rows, 0);
+  responses_.assign(rows, {});
+  row_forces_.assign(rows, {});
+  carries_.assign(points_.row_of_entry().size(), {});
+  shares_.assign(points, 0);
+  is_active_.assign(points, 0);
+  forces_.assign(count(), {});
+  totals_.assign(count(), {});
+  active_.clear();
 }
 
 void BodyContacts::set_gradient(std::size_t p, const Mat3d& gradient) {
@@ -61,12 +45,6 @@ int BodyContacts::threads_here() const {
 }
 
 ContactPasses BodyContacts::passes() {
-  const std::size_t rows = points_.rows().size();
-  touches_.resize(rows);
-  responses_.resize(rows);
-  row_forces_.resize(rows);
-  carries_.resize(points_.row_of_entry().size());
-  shares_.resize(points_.sites().size());
   return {.site = points_.sites().data(),
           .motion = motion_.data(),
           .velocity = velocity_.data(),
@@ -91,7 +69,10 @@ void BodyContacts::find_touches() {
   const ContactPasses passes = this->passes();
   const auto rows = static_cast<Index>(touches_.size());
 #pragma omp parallel for schedule(static) num_threads(threads_here())
-  for (Index r = 0; r < rows; ++r) passes.find_touch(OneThread{}, r);
+  for (Index r = 0; r < rows; ++r) {
+    passes.find_touch(OneThread{}, r);
+    is_inside_[r] = touches_[r].is_inside;
+  }
 }
 
 void BodyContacts::add_depths(std::vector<double>& deepest) const {
@@ -103,30 +84,45 @@ void BodyContacts::add_depths(std::vector<double>& deepest) const {
   }
 }
 
+void BodyContacts::find_active() {
+  for (const Index p : active_) is_active_[p] = 0;
+  inside_.clear();
+  active_.clear();
+  own_active_.clear();
+  const auto add = [&](Index p) {
+    if (is_active_[p]) return;
+    is_active_[p] = 1;
+    active_.push_back(p);
+    if (p < static_cast<Index>(count())) own_active_.push_back(p);
+  };
+  for (std::size_t r = 0; r < is_inside_.size(); ++r) {
+    if (!is_inside_[r]) continue;
+    inside_.push_back(static_cast<Index>(r));
+    add(points_.rows()[r].point);
+    for (const Index p : points_.near_row(r)) add(p);
+  }
+}
+
 void BodyContacts::find_responses() {
   const ContactPasses passes = this->passes();
-  const auto rows = static_cast<Index>(touches_.size()),
-             points = static_cast<Index>(shares_.size());
 #pragma omp parallel num_threads(threads_here())
   {
 #pragma omp for schedule(static)
-    for (Index p = 0; p < points; ++p) passes.find_share(OneThread{}, p);
+    for (std::size_t k = 0; k < active_.size(); ++k) passes.find_share(OneThread{}, active_[k]);
 #pragma omp for schedule(static)
-    for (Index r = 0; r < rows; ++r) passes.find_response(OneThread{}, r);
+    for (std::size_t k = 0; k < inside_.size(); ++k) passes.find_response(OneThread{}, inside_[k]);
   }
 }
 
 void BodyContacts::find_forces() {
   const ContactPasses passes = this->passes();
-  const auto rows = static_cast<Index>(touches_.size());
-  forces_.resize(count());
 #pragma omp parallel num_threads(threads_here())
   {
 #pragma omp for schedule(static)
-    for (Index r = 0; r < rows; ++r) passes.find_force(OneThread{}, r);
+    for (std::size_t k = 0; k < inside_.size(); ++k) passes.find_force(OneThread{}, inside_[k]);
 #pragma omp for schedule(static)
-    for (std::size_t p = 0; p < forces_.size(); ++p) {
-      forces_[p] = passes.forces_on(OneThread{}, static_cast<Index>(p));
+    for (std::size_t k = 0; k < own_active_.size(); ++k) {
+      forces_[own_active_[k]] = passes.forces_on(OneThread{}, own_active_[k]);
     }
   }
 }
@@ -151,11 +147,10 @@ std::size_t BodyContacts::bytes() const {
     const bool is_new = of_body && counted.insert(of_body.arrays.get()).second;
     if (is_new) distances += of_body.arrays->bytes();
   }
-  return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) +
-         found_at_.size() * sizeof(Vec3d) +
+  return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) + watch_.bytes() +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(Vec3d) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
-         carries_.size() * sizeof(SurfaceShare) + forces_.size() * sizeof(PointForces);
+         carries_.size() * sizeof(SurfaceShare) + 2 * forces_.size() * sizeof(PointForces);
 }
 
 }  // namespace phyxel

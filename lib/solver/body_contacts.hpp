@@ -3,20 +3,16 @@
 
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "phyxel/model.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "solver/contact_search.hpp"
+#include "solver/contact_watch.hpp"
 #include "solver/step_sums.hpp"
 
 namespace phyxel {
-
-/// A phyxel of a surface at the start of a step.
-struct SurfaceState {
-  Vec3d displacement;  ///< [m]
-  Vec3d velocity;      ///< [m/s]
-};
 
 /// The points of surfaces that may touch other bodies soon, and the lists of neighbours among them.
 /// The points of this rank come first, then the points of other ranks.
@@ -38,6 +34,8 @@ class TouchingPoints {
   std::span<const Index> bodies() const { return body_; }
   std::span<const ContactRow> rows() const { return rows_.rows; }
   const Csr& near() const { return rows_.near; }
+  /// The points near the point of a row.
+  std::span<const Index> near_row(std::size_t r) const { return rows_.near_row(r); }
   std::span<const Index> row_of_entry() const { return row_of_entry_; }
   /// For each point, the entries that name it, in `contact_threads` lists, and the rows that belong
   /// to it, ascending.
@@ -72,28 +70,6 @@ class TouchingPoints {
   std::vector<std::vector<Index>> receive_;  // points of other ranks, by rank
 };
 
-/// When points that may touch have to be found anew: before phyxels have moved by half a skin.
-class ContactWatch {
- public:
-  /// @param rarest most steps between two looks: what an impact sets in motion must not go far
-  ///   before the next one
-  explicit ContactWatch(int rarest) : rarest_(rarest) {}
-  /// True if it is time to look where phyxels are, before a step of `dt` [s].
-  bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
-  /// Returns true if points have to be found anew. Of a share: collective.
-  /// @param moved how far the phyxels of the layer have moved since the last time [m]
-  /// @param fastest their largest speed [m/s]
-  bool look(const Model& model, double moved, double fastest, double skin, double dt);
-  /// How often they had to be.
-  std::int64_t generation() const { return generation_; }
-
- private:
-  int rarest_;
-  std::int64_t generation_ = 0;
-  double dt_ = 0;  // [s]
-  int left_ = 0;   // steps until the next look
-};
-
 /// Keeps the bodies of a model out of each other, step by step, and adds up what they do.
 class BodyContacts {
  public:
@@ -111,10 +87,11 @@ class BodyContacts {
   void begin_step(double dt, StateOf&& state_of) {
     if (!acts()) return;
     const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
-    if (watch_.is_due(dt)) {
-      std::vector<SurfaceState> states(layer.size());
-      for (std::size_t k = 0; k < layer.size(); ++k) states[k] = state_of(layer[k]);
-      look(states, dt);
+    if (watch_.is_late(dt, points_.skin(), state_of)) {
+      std::vector<Vec3d> position;
+      position.reserve(layer.size());
+      for (const Index i : layer) position.push_back(model_.position[i] + state_of(i).displacement);
+      find_points(std::move(position), dt);
     }
     dt_ = dt;
     for (std::size_t p = 0; p < points_.own().size(); ++p) {
@@ -138,25 +115,27 @@ class BodyContacts {
     if (!acts() || !points_.any()) return;
     place(get);
     find_touches();
+    find_active();
+    if (active_.empty() && !model_.share) return;
     find_responses();
-    std::vector<PointForces> all(count());  // of all sweeps
     for (int sweep = 0; sweep < model_.body_contact.sweeps; ++sweep) {
       if (sweep > 0) points_.refresh(velocity_);
       find_forces();
       const ContactPasses passes = this->passes();
-      for (std::size_t p = 0; p < count(); ++p) {
-        const Vec3d change = passes.change_by(forces_[p], static_cast<Index>(p));
+      for (const Index p : own_active_) {
+        const Vec3d change = passes.change_by(forces_[p], p);
         if (change != Vec3d{}) {
           const SurfaceState state = get(phyxel(p));
           set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
           velocity_[p] = get(phyxel(p)).velocity;
         }
-        all[p].normal += forces_[p].normal;
-        all[p].tangential += forces_[p].tangential;
+        totals_[p].normal += forces_[p].normal;
+        totals_[p].tangential += forces_[p].tangential;
       }
     }
-    for (std::size_t p = 0; p < count(); ++p) {
-      if (all[p].normal != Vec3d{}) add_to_sums(p, all[p]);
+    for (const Index p : own_active_) {
+      const PointForces total = std::exchange(totals_[p], {});
+      if (total.normal != Vec3d{}) add_to_sums(p, total);
     }
   }
   /// The depth of the deepest phyxel of each body in other bodies [m]. Of a share: that of this
@@ -176,7 +155,7 @@ class BodyContacts {
   std::size_t bytes() const;
 
  private:
-  void look(std::span<const SurfaceState> states, double dt);
+  void find_points(std::vector<Vec3d> position, double dt);
   /// Sets where points are at the end of the step.
   template <class Get>
   void place(Get&& get) {
@@ -189,6 +168,9 @@ class BodyContacts {
     points_.refresh(velocity_);
   }
   void find_touches();
+  /// Finds the rows whose points are inside other bodies, and all points of these rows: no other
+  /// point has a force.
+  void find_active();
   void find_responses();
   void find_forces();
   void add_depths(std::vector<double>& deepest) const;
@@ -208,10 +190,14 @@ class BodyContacts {
   std::vector<SurfaceShare> carries_;       // shape [entries]
   std::vector<SurfaceForce> row_forces_;    // shape [rows]
   std::vector<double> shares_;              // c of each point
-  std::vector<PointForces> forces_;         // on this rank's points
-  ContactWatch watch_{1};
-  std::vector<Vec3d> found_at_;  // places of the layer when points were found [m]
-  double dt_ = 0;                // [s]
+  std::vector<PointForces> forces_;         // on this rank's points, of the active ones
+  std::vector<PointForces> totals_;         // the same of all sweeps of a step
+  std::vector<char> is_inside_;             // of each row
+  std::vector<Index> inside_;               // rows whose point is inside the body
+  std::vector<char> is_active_;             // of each point
+  std::vector<Index> active_, own_active_;  // points of these rows, and those of this rank
+  LayerWatch watch_;
+  double dt_ = 0;  // [s]
 };
 
 }  // namespace phyxel

@@ -1,0 +1,106 @@
+/// When points of surfaces that may touch other bodies have to be found anew.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "model/box.hpp"
+#include "model/contact_groups.hpp"
+#include "phyxel/model.hpp"
+
+namespace phyxel {
+
+/// A phyxel of a surface at the start of a step.
+struct SurfaceState {
+  Vec3d displacement;  ///< [m]
+  Vec3d velocity;      ///< [m/s]
+};
+
+/// When points that may touch have to be found anew: before phyxels have moved by half a skin.
+class ContactWatch {
+ public:
+  /// @param rarest most steps between two looks: what an impact sets in motion must not go far
+  ///   before the next one
+  explicit ContactWatch(int rarest) : rarest_(rarest) {}
+  /// True if it is time to look where phyxels are, before a step of `dt` [s].
+  bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
+  /// Returns true if points have to be found anew. Of a share: collective.
+  /// @param moved how far the phyxels of the layer have moved since the last time [m]
+  /// @param fastest their largest speed [m/s]
+  bool look(const Model& model, double moved, double fastest, double skin, double dt);
+  /// True if points have been found for steps of `dt` [s].
+  bool has_found(double dt) const { return generation_ > 0 && dt == dt_; }
+  /// Notes that points are found anew for steps of `dt` [s].
+  void renew(double dt) {
+    ++generation_;
+    dt_ = dt;
+  }
+  /// How often they had to be.
+  std::int64_t generation() const { return generation_; }
+
+ private:
+  int rarest_;
+  std::int64_t generation_ = 0;
+  double dt_ = 0;  // [s]
+  int left_ = 0;   // steps until the next look
+};
+
+/// The motion of the phyxels of a body's surface since points were found.
+struct SurfaceWay {
+  Box moved = no_box;   ///< Box of their ways [m].
+  Box speeds = no_box;  ///< Box of their velocities [m/s].
+};
+
+/// Watches the layer of a model on the host, in each step: what comes to bodies at rest may set
+/// them in motion in any step. Bodies that move together need no new points, however fast they are,
+/// nor do bodies far from each other.
+class LayerWatch {
+ public:
+  /// @param model must outlive this. @param threads most threads that share the work
+  LayerWatch(const Model& model, int threads);
+
+  /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
+  /// @param skin as of `TouchingPoints` [m]. @param state_of returns the state of a phyxel
+  template <class StateOf>
+  bool is_late(double dt, double skin, StateOf&& state_of) {
+    if (!found_at_.empty()) {
+#pragma omp parallel for schedule(static) num_threads(threads_)
+      for (std::size_t g = 0; g < groups_.size(); ++g) {
+        SurfaceWay way;
+        for (std::size_t k = groups_[g].begin; k < groups_[g].end; ++k) {
+          const Index i = layer()[k];
+          const SurfaceState state = state_of(i);
+          extend(way.moved, model_.position[i] + state.displacement - found_at_[k]);
+          extend(way.speeds, state.velocity);
+        }
+        ways_[g] = way;
+      }
+    }
+    return model_.share ? is_late_on_ranks(dt, skin) : is_late_here(dt, skin);
+  }
+  /// Notes the places at which points are found [m], shape [layer].
+  void found(std::vector<Vec3d> position, double skin);
+  /// A number that changes with each search.
+  std::int64_t generation() const { return watch_.generation(); }
+  std::size_t bytes() const { return found_at_.size() * sizeof(Vec3d); }
+
+ private:
+  const std::vector<Index>& layer() const { return model_.body_contact.layer.phyxels; }
+  bool is_late_on_ranks(double dt, double skin);
+  bool is_late_here(double dt, double skin);
+  /// True if bodies may touch in the next step at places that are not among the points.
+  bool have_come_near(double dt, double skin) const;
+
+  const Model& model_;
+  std::vector<LayerGroup> groups_;
+  int threads_;
+  ContactWatch watch_{1};
+  std::vector<Vec3d> found_at_;   // [m], shape [layer]
+  std::vector<SurfaceWay> ways_;  // of each group
+  // Of each body of the scene: its box when points were found, grown by the ranges of its phyxels,
+  // and the bodies beside it then, ascending.
+  std::vector<Box> boxes_;
+  std::vector<std::vector<Index>> partners_;
+};
+
+}  // namespace phyxel
