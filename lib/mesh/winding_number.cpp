@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "mesh/face_relaxation.hpp"
+#include "model/box.hpp"
 
 namespace phyxel {
 namespace {
@@ -30,6 +31,15 @@ double direct_winding_number(const std::vector<Vec3d>& position,
     sum += half_solid_angle(position[t[0]] - point, position[t[1]] - point, position[t[2]] - point);
   }
   return sum / (2 * std::numbers::pi);
+}
+
+double WindingNumber::Bounds::squared_distance(Vec3d x) const {
+  const auto beyond = [](double at, double least, double most) {
+    return std::max({least - at, at - most, 0.0});
+  };
+  const Vec3d way{beyond(x.x, low.x, high.x), beyond(x.y, low.y, high.y),
+                  beyond(x.z, low.z, high.z)};
+  return dot(way, way);
 }
 
 WindingNumber::WindingNumber(const Surface& surface, double accuracy) : accuracy_(accuracy) {
@@ -71,6 +81,10 @@ void WindingNumber::build(Index index) {
                             norm(t->c - node.centre)});
   }
   node.radius *= accuracy_;
+  std::vector<Vec3d> points;
+  for (auto t = first; t != last; ++t) points.insert(points.end(), {t->a, t->b, t->c});
+  const Box box = box_around(points);
+  bounds_.push_back({box.low, box.high});  // nodes are built in their order
 
   if (node.count > largest_leaf) {
     const Vec3d extent = high - low;
@@ -142,21 +156,20 @@ double WindingNumber::distance(Vec3d point, double most, Index* nearest_triangle
     at = t;
   };
   if (at >= 0) look(at);
-  /// A node to visit, and the least distance of its triangles.
+  /// A node to visit, and the least squared distance of its triangles.
   struct Waiting {
     Index node;
     double least;
   };
   const auto waiting = [&](Index index) {
-    const Node& node = nodes_[index];
-    return Waiting{index, norm(node.centre - point) - node.radius / accuracy_};
+    return Waiting{index, bounds_[static_cast<std::size_t>(index)].squared_distance(point)};
   };
   Waiting stack[64];
   int depth = 0;
   stack[depth++] = waiting(0);
   while (depth > 0) {
     const Waiting next = stack[--depth];
-    if (next.least >= nearest) continue;
+    if (next.least >= nearest * nearest) continue;
     const Node& node = nodes_[next.node];
     if (node.child >= 0) {
       Waiting near = waiting(node.child), far = waiting(node.child + 1);

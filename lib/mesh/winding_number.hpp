@@ -37,6 +37,12 @@ class WindingNumber {
   struct Corners {
     Vec3d a, b, c;
   };
+  /// The box around the triangles of a node [m].
+  struct Bounds {
+    Vec3d low, high;
+    /// The squared distance of a point, 0 inside [m²].
+    double squared_distance(Vec3d x) const;
+  };
   /// A node of the tree of triangles. Its two children are adjacent; a leaf has none.
   struct Node {
     Vec3d centre;  ///< Area-weighted [m].
@@ -53,6 +59,7 @@ class WindingNumber {
   double accuracy_;
   std::vector<Corners> corners_;
   std::vector<Node> nodes_;
+  std::vector<Bounds> bounds_;  // of each node
 };
 
 }  // namespace phyxel
