@@ -104,7 +104,7 @@ void expect_same_contact(const Model& here, const Model& expected) {
   EXPECT_EQ(found.layer.offset, wanted.layer.offset);
   ASSERT_EQ(found.distances.size(), wanted.distances.size());
   for (std::size_t b = 0; b < wanted.distances.size(); ++b) {
-    EXPECT_TRUE(same_bits(found.distances[b]->fine, wanted.distances[b]->fine));
+    EXPECT_TRUE(same_bits(found.distances[b].arrays->fine, wanted.distances[b].arrays->fine));
   }
 }
 
