@@ -86,17 +86,17 @@ class BodyPenalty {
   const Model& model_;
   TouchingPoints points_;
   std::vector<PlacedDistances> fields_;  // of each body of the scene
-  std::vector<double> modulus_;        // of pressure waves, of each body [Pa]
-  std::vector<Vec3d> found_at_;        // places of the layer when points were found [m]
-  std::vector<Vec3d> shaped_at_;       // places of own points when normals were found [m]
-  std::vector<Vec3d> start_;           // displacements of the points at `linearise` [m]
-  std::vector<SurfaceMotion> motion_;  // shape [points]
-  std::vector<SurfaceTouch> touches_;  // shape [rows], as all others of rows
-  std::vector<SurfaceShare> carries_;  // shape [entries]
-  std::vector<double> gap_;            // g₀ of each row [m]
-  std::vector<double> expected_;       // gaps at `linearise` by the linear form before it [m]
-  std::vector<double> stiffness_;      // k of each row [N/m]
-  std::vector<Mat3d> blocks_;          // of this rank's points [N/m]
+  std::vector<double> modulus_;          // of pressure waves, of each body [Pa]
+  std::vector<Vec3d> found_at_;          // places of the layer when points were found [m]
+  std::vector<Vec3d> shaped_at_;         // places of own points when normals were found [m]
+  std::vector<Vec3d> start_;             // displacements of the points at `linearise` [m]
+  std::vector<SurfaceMotion> motion_;    // shape [points]
+  std::vector<SurfaceTouch> touches_;    // shape [rows], as all others of rows
+  std::vector<SurfaceShare> carries_;    // shape [entries]
+  std::vector<double> gap_;              // g₀ of each row [m]
+  std::vector<double> expected_;         // gaps at `linearise` by the linear form before it [m]
+  std::vector<double> stiffness_;        // k of each row [N/m]
+  std::vector<Mat3d> blocks_;            // of this rank's points [N/m]
   AndersonMixing mixing_;
   // The same on all ranks: what of the above is of this search.
   bool knows_points_ = false, knows_shapes_ = false, knows_expected_ = false;

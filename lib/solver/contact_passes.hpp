@@ -41,12 +41,12 @@ struct ContactPasses {
   const Offset* rows_from_start = nullptr;
   const Index* rows_from = nullptr;
   const PlacedDistances* field = nullptr;  ///< Of each body of the scene.
-  SurfaceTouch* touch = nullptr;         ///< Of each row.
-  SurfaceResponse* response = nullptr;   ///< Of each row.
-  SurfaceForce* force = nullptr;         ///< Of each row.
-  SurfaceShare* carries = nullptr;       ///< Of each entry.
-  double* share = nullptr;               ///< c of each point [m²].
-  double dt = 0;                         ///< [s]
+  SurfaceTouch* touch = nullptr;           ///< Of each row.
+  SurfaceResponse* response = nullptr;     ///< Of each row.
+  SurfaceForce* force = nullptr;           ///< Of each row.
+  SurfaceShare* carries = nullptr;         ///< Of each entry.
+  double* share = nullptr;                 ///< c of each point [m²].
+  double dt = 0;                           ///< [s]
   /// As of `surface_touch`. By default a point has to be inside by more than rounding.
   double reach = -1e-9;
 

@@ -216,8 +216,7 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   const Vec3<double> x =
       scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
   // What leads back to the point's own neighbourhood is no other part of the body.
-  const Vec3<double> from_rest = x - site.rest;
-  if (dot(from_rest, from_rest) < least * least) return touch;
+  if (const Vec3<double> way = x - site.rest; dot(way, way) < least * least) return touch;
   const Gap gap = field.gap(x);
   const Vec3<double> m = transpose(back) * gap.normal;
   const double length = std::sqrt(dot(m, m));
@@ -225,7 +224,6 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   touch.normal = (1 / length) * m;
   touch.gap = (gap.distance - scale * threads.sum(level)) / length -
               dot(touch.normal, point.probe) - site.offset;
-  // A surface is touched from outside.
   if (!(touch.gap < reach * site.range) ||
       dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
     return touch;
