@@ -181,13 +181,16 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
   const double support = smallest_support(model);
   for (const ContactReading& reading : readings) {
     if (!(reading.depth > deepest * support)) continue;
+    const bool is_body = reading.shape == body_shape;
+    const std::string whose = is_body ? fmt::format(" of body \"{}\"", reading.obstacle) : "";
+    const std::string where = !is_body ? fmt::format("obstacle \"{}\"", reading.obstacle)
+                              : model.body_contact.self ? "other bodies or other parts of it"
+                                                        : "other bodies";
     say_wrong(
         model,
-        fmt::format("phyxels are {:.3g} m deep in {} \"{}\", a quarter of a support of {:.3g} m "
-                    "is allowed: something presses them into it, or they are too fast for the "
-                    "step",
-                    reading.depth, reading.shape == body_shape ? "other bodies: body" : "obstacle",
-                    reading.obstacle, support));
+        fmt::format("phyxels{} are {:.3g} m deep in {}, a quarter of a support of {:.3g} m is "
+                    "allowed: something presses them into it, or they are too fast for the step",
+                    whose, reading.depth, where, support));
   }
 }
 

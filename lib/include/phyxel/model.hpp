@@ -169,8 +169,9 @@ struct BodyDistances {
   Vec3d place;                                   ///< Where the field's origin is in place [m].
 
   explicit operator bool() const { return arrays != nullptr; }
-  /// A view of the arrays, or of `field`, a copy of them on a device, in place.
+  /// A view of the arrays in place.
   PlacedDistances view() const;
+  /// A view of `field`, a copy of the arrays on a device, in place.
   PlacedDistances view(const DistanceField& field) const { return {field, turn, place}; }
   /// The place of the arrays' deepest point [m].
   Vec3d deepest() const;
