@@ -19,15 +19,10 @@ double harmonic_mean(double a, double b) { return 2 * a * b / (a + b); }
 
 }  // namespace
 
-BodyPenalty::BodyPenalty(const Model& model)
-    : model_(model), points_(model), modulus_(model.body_contact.distances.size()) {
+BodyPenalty::BodyPenalty(const Model& model) : model_(model), points_(model) {
   if (empty()) return;
   for (const auto& distances : model.body_contact.distances) {
     fields_.push_back(distances ? distances.view() : PlacedDistances{});
-  }
-  for (const Part& part : model.parts) {
-    const double c = pressure_wave_speed(part.material);
-    modulus_[part.body] = part.material.density * c * c;
   }
 }
 
@@ -43,6 +38,13 @@ void BodyPenalty::find_points(const Vector& u) {
   if (moved <= 0.5 * points_.skin()) return;
   found_at_ = std::move(now);
   points_.find(found_at_, 1);
+  modulus_.assign(points_.sites().size(), {});
+  for (std::size_t p = 0; p < count(); ++p) {
+    const Material& material = part_of(model_, phyxel(p)).material;
+    const double c = pressure_wave_speed(material);
+    modulus_[p] = {material.density * c * c, 0, 0};
+  }
+  points_.refresh(modulus_);
   knows_points_ = true;
   knows_shapes_ = knows_expected_ = false;
   mixing_.forget();
@@ -74,7 +76,11 @@ void BodyPenalty::find_touches() {
   constexpr double far = 0.01;
   if (moved <= far) {
     for (std::size_t r = 0; r < touches.size(); ++r) {
-      if (touches[r].normal != Vec3d{}) touches_[r].gap = touches[r].gap;
+      if (touches[r].normal != Vec3d{}) {
+        touches_[r].gap = touches[r].gap;
+      } else {
+        touches_[r].is_inside = false;  // nothing of the other surface faces it any more
+      }
     }
     return;
   }
@@ -100,11 +106,17 @@ void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient)
   points_.refresh(motion_);
   start_ = of_points(u);
   find_touches();
-  stiffness_.resize(rows);
+  stiffness_.assign(rows, 0);
   for (std::size_t r = 0; r < rows; ++r) {
-    const ContactRow& row = points_.rows()[r];
-    const SurfaceSite& site = points_.sites()[row.point];
-    const double modulus = harmonic_mean(modulus_[points_.bodies()[row.point]], modulus_[row.body]);
+    if (!touches_[r].is_inside) continue;
+    const Index point = points_.rows()[r].point;
+    const SurfaceSite& site = points_.sites()[point];
+    const Offset* start = points_.near().offsets.data() + contact_threads * r;
+    double of_surface = 0;
+    for (Offset e = start[0]; e < start[contact_threads]; ++e) {
+      of_surface += carries_[e].weight * modulus_[points_.near().indices[e]].x;
+    }
+    const double modulus = harmonic_mean(modulus_[point].x, of_surface);
     stiffness_[r] = share_of_stiffness * modulus * site.area / site.range;
   }
   gap_.resize(rows);
