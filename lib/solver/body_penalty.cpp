@@ -111,11 +111,10 @@ void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient)
     if (!touches_[r].is_inside) continue;
     const Index point = points_.rows()[r].point;
     const SurfaceSite& site = points_.sites()[point];
-    const Offset* start = points_.near().offsets.data() + contact_threads * r;
     double of_surface = 0;
-    for (Offset e = start[0]; e < start[contact_threads]; ++e) {
-      of_surface += carries_[e].weight * modulus_[points_.near().indices[e]].x;
-    }
+    for_each_carrier(r, [&](Index p, const SurfaceShare& carries) {
+      of_surface += carries.weight * modulus_[p].x;
+    });
     const double modulus = harmonic_mean(modulus_[point].x, of_surface);
     stiffness_[r] = share_of_stiffness * modulus * site.area / site.range;
   }
@@ -138,7 +137,7 @@ bool BodyPenalty::mix(const Vector& u) {
   const auto product = [&](const std::vector<double>& a, const std::vector<double>& b) {
     ExactSum sum;
     for (std::size_t r = 0; r < a.size(); ++r) {
-      if (points_.rows()[r].point < static_cast<Index>(count())) sum.add(a[r] * b[r]);
+      if (is_own(r)) sum.add(a[r] * b[r]);
     }
     if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
     return sum.value();
@@ -147,7 +146,6 @@ bool BodyPenalty::mix(const Vector& u) {
   for (std::size_t r = 0; r < gap_.size(); ++r) {
     if (touches_[r].is_inside) gap_[r] = next[r] + way[r];
   }
-  find_blocks();
   return true;
 }
 
@@ -159,11 +157,9 @@ std::vector<Vec3d> BodyPenalty::of_points(const Vector& of_phyxels) const {
 }
 
 double BodyPenalty::along_normal(std::size_t r, const std::vector<Vec3d>& of_points) const {
-  const Offset* start = points_.near().offsets.data() + contact_threads * r;
   Vec3d apart = of_points[points_.rows()[r].point];
-  for (Offset e = start[0]; e < start[contact_threads]; ++e) {
-    apart += -carries_[e].part * of_points[points_.near().indices[e]];
-  }
+  for_each_carrier(
+      r, [&](Index p, const SurfaceShare& carries) { apart += -carries.part * of_points[p]; });
   return dot(touches_[r].normal, apart);
 }
 
@@ -196,10 +192,12 @@ std::vector<double> BodyPenalty::gaps(const Vector& u) const {
 
 std::vector<double> BodyPenalty::pushes(const Vector& u) const {
   std::vector<double> push = gaps(u);
-  for (std::size_t r = 0; r < push.size(); ++r) {
-    push[r] = touches_[r].is_inside ? std::max(0.0, -stiffness_[r] * push[r]) : 0;
-  }
+  for (std::size_t r = 0; r < push.size(); ++r) push[r] = push_at(r, push[r]);
   return push;
+}
+
+double BodyPenalty::push_at(std::size_t r, double gap) const {
+  return touches_[r].is_inside ? std::max(0.0, -stiffness_[r] * gap) : 0;
 }
 
 void BodyPenalty::add(const Vector& u, Vector& force) const {
@@ -212,18 +210,14 @@ void BodyPenalty::add_energy(const Vector& u, ExactSum& sum) const {
   if (empty()) return;
   const std::vector<double> push = pushes(u);
   for (std::size_t r = 0; r < push.size(); ++r) {
-    if (points_.rows()[r].point < static_cast<Index>(count()) && push[r] > 0) {
-      sum.add(0.5 * push[r] * push[r] / stiffness_[r]);
-    }
+    if (is_own(r) && push[r] > 0) sum.add(0.5 * push[r] * push[r] / stiffness_[r]);
   }
 }
 
 void BodyPenalty::add_squares(ExactSum& sum) const {
   for (std::size_t r = 0; r < touches_.size(); ++r) {
-    const SurfaceTouch& touch = touches_[r];
-    const bool is_own = points_.rows()[r].point < static_cast<Index>(count());
-    if (!is_own || !touch.is_inside || touch.gap >= 0) continue;
-    sum.add(stiffness_[r] * touch.gap * stiffness_[r] * touch.gap);
+    const double push = push_at(r, touches_[r].gap);
+    if (is_own(r)) sum.add(push * push);
   }
 }
 
@@ -252,18 +246,16 @@ void BodyPenalty::find_blocks() {
       if (p < static_cast<Index>(count())) blocks_[p] += share * whole;
     };
     add_to(points_.rows()[r].point, 1);
-    const Offset* start = points_.near().offsets.data() + contact_threads * r;
-    for (Offset e = start[0]; e < start[contact_threads]; ++e) {
-      add_to(points_.near().indices[e], carries_[e].part * carries_[e].part);
-    }
+    for_each_carrier(
+        r, [&](Index p, const SurfaceShare& carries) { add_to(p, carries.part * carries.part); });
   }
 }
 
 BodyPenalty::Depths BodyPenalty::depths() const {
   Depths found{std::vector<double>(fields_.size())};
   for (std::size_t r = 0; r < touches_.size(); ++r) {
+    if (!touches_[r].is_inside || !is_own(r)) continue;
     const Index p = points_.rows()[r].point;
-    if (!touches_[r].is_inside || p >= static_cast<Index>(count())) continue;
     double& depth = found.of_body[points_.bodies()[p]];
     depth = std::max(depth, -touches_[r].gap);
     found.share = std::max(found.share, -touches_[r].gap / points_.sites()[p].range);
@@ -274,9 +266,7 @@ BodyPenalty::Depths BodyPenalty::depths() const {
 void BodyPenalty::add_to(const Vector& velocity, double time, std::span<ExactSum> sums) const {
   if (empty()) return;
   std::vector<double> push(touches_.size());
-  for (std::size_t r = 0; r < push.size(); ++r) {
-    if (touches_[r].is_inside) push[r] = std::max(0.0, -stiffness_[r] * touches_[r].gap);
-  }
+  for (std::size_t r = 0; r < push.size(); ++r) push[r] = push_at(r, touches_[r].gap);
   const std::vector<Vec3d> forces = spread(push);
   for (std::size_t p = 0; p < count(); ++p) {
     if (forces[p] == Vec3d{}) continue;

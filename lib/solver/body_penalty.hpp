@@ -28,8 +28,8 @@ class BodyPenalty {
   /// Finds which points are near other bodies, and how. Of a share: collective, as all that follow.
   /// @param u displacements [m]. @param gradient of displacement, shape [n, 3, 3]
   void linearise(const Vector& u, const std::vector<Mat3d>& gradient);
-  /// Forgets all that depends on earlier searches, so that a search that a restart begins anew is
-  /// the same.
+  /// Begins a search anew: points, normals and gaps of earlier searches have no influence on it, so
+  /// that a restart gives the same bits.
   void forget() { knows_points_ = false; }
   /// Replaces the gaps at u, the displacements of `linearise`, by those from which the next step of
   /// Newton's method is most likely to lead to a place where gaps are what it takes them for: they
@@ -67,6 +67,16 @@ class BodyPenalty {
  private:
   std::size_t count() const { return points_.own().size(); }
   Index phyxel(std::size_t p) const { return model_.body_contact.layer.phyxels[points_.own()[p]]; }
+  /// True if the point of a row is of this rank.
+  bool is_own(std::size_t r) const { return points_.rows()[r].point < static_cast<Index>(count()); }
+  /// Calls each(p, share) for the points that carry the point of a row.
+  template <class Each>
+  void for_each_carrier(std::size_t r, Each&& each) const {
+    const Offset* start = points_.near().offsets.data() + contact_threads * r;
+    for (Offset e = start[0]; e < start[contact_threads]; ++e) {
+      each(points_.near().indices[e], carries_[e]);
+    }
+  }
   void find_points(const Vector& u);
   void find_touches();
   /// True if a row pushes, or would at once.
@@ -80,6 +90,8 @@ class BodyPenalty {
   std::vector<Vec3d> spread(const std::vector<double>& push) const;
   /// Gaps at displacements u [m]; of points that are not near other bodies, what they were.
   std::vector<double> gaps(const Vector& u) const;
+  /// The force along the normal of a row at a gap [m] [N].
+  double push_at(std::size_t r, double gap) const;
   /// Forces along the normals at displacements u [N].
   std::vector<double> pushes(const Vector& u) const;
 
@@ -98,7 +110,7 @@ class BodyPenalty {
   std::vector<double> stiffness_;        // k of each row [N/m]
   std::vector<Mat3d> blocks_;            // of this rank's points [N/m]
   AndersonMixing mixing_;
-  // The same on all ranks: what of the above is of this search.
+  // Whether points, normals and expected gaps belong to this search; the same on all ranks.
   bool knows_points_ = false, knows_shapes_ = false, knows_expected_ = false;
 };
 

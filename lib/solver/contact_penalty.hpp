@@ -43,7 +43,7 @@ class ContactPenalty {
   /// @param gradient_of_u returns the gradients of displacement, for bodies that touch each other
   void linearise(const PlacedObstacles& at, const Vector& u,
                  const std::function<std::vector<Mat3d>()>& gradient_of_u);
-  /// Forgets all that depends on earlier searches.
+  /// Begins a search anew, on which earlier searches have no influence.
   void forget() { bodies_.forget(); }
   /// Replaces the gaps between bodies at u, the displacements of the last `linearise`, by better
   /// ones to start a step of Newton's method from. @returns true if that changes forces

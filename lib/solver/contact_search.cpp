@@ -7,6 +7,7 @@
 
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
+#include "model/contact_groups.hpp"
 #include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
 #include "rank_exchange.hpp"
@@ -14,8 +15,6 @@
 
 namespace phyxel {
 namespace {
-
-constexpr Box nowhere{{HUGE_VAL, HUGE_VAL, HUGE_VAL}, {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL}};
 
 Box together(const Box& a, const Box& b) {
   return {
@@ -91,7 +90,7 @@ Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries)
 std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
                                  std::span<const SurfaceSite> sites, double skin) {
   const BodyContact& contact = model.body_contact;
-  std::vector<Box> boxes(contact.distances.size(), nowhere);
+  std::vector<Box> boxes(contact.distances.size(), no_box);
   for (std::size_t k = 0; k < position.size(); ++k) {
     Box& box = boxes[part_of(model, contact.layer.phyxels[k]).body];
     box = together(box, grown({position[k], position[k]}, sites[k].range + 0.5 * skin));

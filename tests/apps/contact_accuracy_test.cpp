@@ -3,34 +3,22 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <stdexcept>
 #include <string>
 
-#include "accuracy/accuracy.hpp"
+#include "support/accuracy.hpp"
 #include "support/program.hpp"
 
 namespace phyxel {
 namespace {
 
-using app::AccuracyCase;
 using app::Discretisation;
 using app::Filling;
-using app::Quantity;
 using app::Solution;
+using testing::error_of;
 
 Solution solved(const std::string& name, Discretisation d) {
   d.hourglass = 0.1;
-  for (const AccuracyCase& c : app::accuracy_cases()) {
-    if (c.name == name) return c.solve(d);
-  }
-  throw std::runtime_error(name);
-}
-
-double error_of(const Solution& solution, const std::string& quantity) {
-  for (const Quantity& q : solution.found) {
-    if (q.name == quantity) return q.error();
-  }
-  throw std::runtime_error(quantity);
+  return testing::solved(name, d);
 }
 
 constexpr Discretisation irregular{.jitter = 0.2, .closure = 1e-3};

@@ -2,35 +2,21 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "accuracy/accuracy.hpp"
+#include "support/accuracy.hpp"
 
 namespace phyxel {
 namespace {
 
-using app::AccuracyCase;
 using app::Discretisation;
 using app::Filling;
 using app::Quantity;
 using app::Solution;
-
-Solution solved(const std::string& name, const Discretisation& d) {
-  for (const AccuracyCase& c : app::accuracy_cases()) {
-    if (c.name == name) return c.solve(d);
-  }
-  throw std::runtime_error(name);
-}
-
-double error_of(const Solution& solution, const std::string& quantity) {
-  for (const Quantity& q : solution.found) {
-    if (q.name == quantity) return q.error();
-  }
-  throw std::runtime_error(quantity);
-}
+using testing::error_of;
+using testing::solved;
 
 /// Increments of Newton's method to 10⁻¹⁰ of the reactions; seen: 2e-12 of the yield stress on 64
 /// nodes. Without closed gradients the sides are not quite free of stress: 2.6e-3.
