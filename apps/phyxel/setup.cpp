@@ -160,7 +160,7 @@ std::string describe_contact(const Model& model, std::int64_t touching,
     const Obstacle& o = model.obstacles[k];
     text += fmt::format(
         "  obstacle    {}: {}{}{} at [{:.4g}, {:.4g}, {:.4g}] m; friction {:g}{}{}\n", o.name,
-        o.hollow ? "hollow " : "", shape_name(o), o.motion.stands_still() ? "" : ", moving",
+        o.hollow ? "hollow " : "", shape_name(o), o.free ? ", free" : o.motion.stands_still() ? "" : ", moving",
         o.place.x, o.place.y, o.place.z, o.law.static_friction,
         o.law.kinetic_friction < o.law.static_friction
             ? fmt::format(", {:g} when sliding", o.law.kinetic_friction)

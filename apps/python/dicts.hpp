@@ -75,6 +75,22 @@ inline py::list dicts_of(const std::vector<ContactReading>& contacts) {
   return list;
 }
 
+/// Returns a dict of each free rigid body.
+inline py::list dicts_of(const std::vector<RigidReading>& bodies) {
+  py::list list;
+  for (const RigidReading& body : bodies) {
+    py::dict values;
+    values["obstacle"] = body.obstacle;
+    values["place"] = body.place;
+    values["rotation"] = body.rotation;
+    values["velocity"] = body.velocity;
+    values["spin"] = body.spin;
+    values["kinetic_energy"] = body.kinetic_energy;
+    list.append(values);
+  }
+  return list;
+}
+
 /// Returns the values of readings, one row each, by their names.
 inline py::dict arrays_of(const std::vector<ProbeReading>& readings) {
   std::vector<Vec3d> place, displacement, velocity;

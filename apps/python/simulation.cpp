@@ -71,6 +71,11 @@ void add_simulation(py::module_& module) {
           "angular_impulse [N m s], work [J], friction_heat [J], impact_loss [J],\n"
           "depth [m] of the phyxel that is deepest inside.")
       .def(
+          "rigid_bodies", [](Simulation& s) { return dicts_of(s.rigid_bodies()); },
+          "Obstacles that are free rigid bodies, now: a list of dicts, one for each:\n"
+          "obstacle, place [m] of its centre of mass, rotation [rad] from its position at rest\n"
+          "(axis times angle), velocity [m/s], spin [rad/s], kinetic_energy [J].")
+      .def(
           "forces", [](Simulation& s) { return taken(s.internal_forces()); },
           "Internal forces [N], (n, 3), a copy.")
       .def(

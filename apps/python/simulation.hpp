@@ -122,6 +122,12 @@ class Simulation {
     return find_reactions(model_, *backend_, *solver_);
   }
 
+  std::vector<RigidReading> rigid_bodies() {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    return read_rigid_bodies(model_, *backend_, *solver_);
+  }
+
   std::vector<ContactReading> contacts() {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
@@ -271,7 +277,8 @@ class Simulation {
     frame.diagnostics = look();
     frame.readings = {find_reactions(model_, *backend_, *solver_),
                       probes().read(*backend_, recovery()), read_gases(model_, *backend_, *solver_),
-                      find_contacts(model_, *backend_, *solver_)};
+                      find_contacts(model_, *backend_, *solver_),
+                      read_rigid_bodies(model_, *backend_, *solver_)};
     SurfelState surfels;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);

@@ -98,7 +98,7 @@ class DeviceForm {
 template <class Real, class StateReal>
 class Contacts {
  public:
-  explicit Contacts(DeviceModel<Real, StateReal>& model) : m_(model) {
+  explicit Contacts(DeviceModel<Real, StateReal>& model) : m_(model), rigid_(model.model()) {
     const ContactLayer& layer = m_.model().contact;
     if (m_.model().obstacles.empty()) return;
     const std::string name = "contact";
@@ -128,7 +128,7 @@ class Contacts {
   bool changes() const {
     const std::vector<Obstacle>& all = m_.model().obstacles;
     return std::any_of(all.begin(), all.end(),
-                       [](const Obstacle& o) { return !o.motion.stands_still(); });
+                       [](const Obstacle& o) { return !o.stands_still(); });
   }
   /// Prepares for `count` steps of `dt` [s], some tens at most. Call before they are launched or
   /// recorded.
@@ -154,16 +154,21 @@ class Contacts {
   /// [s].
   void keep_phyxels_out(double time) {
     const LayerArrays<StateReal> layer = arrays();
+    rigid_.begin_step(time, dt_);
     for (std::size_t o = 0; o < sums_.size(); ++o) {
       const Obstacle& obstacle = m_.model().obstacles[o];
-      const ObstacleStep step = obstacle.step_from(time, dt_);
+      const ObstacleStep step = obstacle.free ? rigid_.step_of(o) : obstacle.step_from(time, dt_);
       const SumWords words = sums_[o].pointer();
       ObstacleShapes::with(fields_[o].form(), [&](const auto& shape) {
         m_.launch_each("keep_out", keep_out<std::decay_t<decltype(shape)>, Real, StateReal>,
                        layer.count, m_.fields(), layer, shape, step, words, o + 1 == sums_.size());
       });
     }
+    if (!rigid_.empty()) rigid_.end_step(sums());
   }
+  /// Sets the states of free bodies, as of `RigidBodies::put`.
+  void put_rigid(std::span<const RigidState> states, double dt) { rigid_.put(states, dt); }
+  const std::vector<RigidState>& rigid_states() const { return rigid_.states(); }
   /// The sums of each obstacle so far (`ContactTerms`). Waits for the steps in progress.
   std::vector<ExactSum> sums() const {
     std::vector<ExactSum> all;
@@ -202,6 +207,7 @@ class Contacts {
   DeviceArray<double> offset_, inertia_;
   DeviceArray<Vec3<StateReal>> before_;
   std::vector<DeviceSums> sums_;
+  RigidBodies rigid_;
   std::vector<DeviceForm> fields_;  // of each obstacle
   double dt_ = 0;                   // step for which inertias were made [s]
 };

@@ -53,6 +53,7 @@ class CudaBackend final : public Backend {
   void put(const State& state) override {
     leave_steps();
     m_.put(state);
+    contacts_.put_rigid(state.rigid, state.dt);
     history_interval_ = state.history.empty() ? 0 : state.history_interval;
   }
   void download(State& state) const override {
@@ -61,6 +62,7 @@ class CudaBackend final : public Backend {
     m_.wait();
     m_.take(state);
     state.history_interval = m_.has_history() ? history_interval_ : 0;
+    state.rigid = contacts_.rigid_states();
   }
 
   void set_external_forces(std::span<const Vec3d> force) override {
@@ -111,6 +113,7 @@ class CudaBackend final : public Backend {
     sums.insert(sums.end(), of_bodies.begin(), of_bodies.end());
     return words_of(std::move(sums));
   }
+  std::vector<RigidState> rigid_states() const override { return contacts_.rigid_states(); }
   int best_steps() const override {
     return path_.residence ? path_.residence->most_steps : path_.recorded ? steps_together : 1;
   }

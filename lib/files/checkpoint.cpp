@@ -93,6 +93,20 @@ void check_finite(const Hdf5Reader& in, const std::string& path, const std::vect
   }
 }
 
+constexpr const char* rigid_path = "/state/rigid";
+
+/// The states of free rigid bodies; none in files without any.
+std::vector<RigidState> rigid_in(const Hdf5Reader& in) {
+  std::vector<RigidState> states;
+  if (!in.has(rigid_path)) return states;
+  const std::vector<double> numbers = in.array<double>(rigid_path, RigidState::count);
+  check_finite(in, rigid_path, numbers, 0);
+  for (std::size_t k = 0; k < numbers.size(); k += RigidState::count) {
+    states.push_back(RigidState::from(&numbers[k]));
+  }
+  return states;
+}
+
 std::string history_path(const std::string& column) { return "/state/history/" + column; }
 
 /// The lines of a text.
@@ -200,6 +214,14 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
   if (!state.step_sums.empty()) {
     out.text("/state/support_work", text_of_work(state.step_sums));
   }
+  if (!state.rigid.empty()) {
+    std::vector<double> numbers;
+    for (const RigidState& body : state.rigid) {
+      const auto of_body = body.numbers();
+      numbers.insert(numbers.end(), of_body.begin(), of_body.end());
+    }
+    out.array<double>(rigid_path, numbers, RigidState::count);
+  }
 
   fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
   write_sealed(file, kind, out.content(), Durable::yes);
@@ -272,6 +294,7 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
                             state_.history_interval));
     }
     state_.step_sums = work_in(in, in.text("/state/support_work"));
+    state_.rigid = rigid_in(in);
     for (std::string& name : lines_of(in.text("/state/history_columns"))) {
       const std::string path = history_path(name);
       if (const std::size_t other = in.shape(path).rows; other != rows) {

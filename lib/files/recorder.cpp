@@ -178,6 +178,11 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
     contacts_.emplace(directory_ / contacts_name,
                       header_of("step,time [s],obstacle,shape", contact_columns()));
   }
+  const auto is_free = [](const Obstacle& obstacle) { return obstacle.free.has_value(); };
+  if (std::any_of(model.obstacles.begin(), model.obstacles.end(), is_free)) {
+    rigid_.emplace(directory_ / rigid_name,
+                   header_of("step,time [s],obstacle,shape", rigid_columns()));
+  }
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -257,7 +262,7 @@ void Recorder::create_files() {
 
 std::vector<FrameLog*> Recorder::logs() {
   std::vector<FrameLog*> all;
-  for (std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_}) {
+  for (std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_, &rigid_}) {
     if (*log) all.push_back(&**log);
   }
   return all;
@@ -337,6 +342,11 @@ void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
         diagnostics, readings.contacts, contact_columns(),
         [](const ContactReading& r) { return cell_of(r.obstacle) + "," + cell_of(r.shape); }));
   }
+  if (rigid_ && !readings.rigid.empty()) {
+    rigid_->append(lines_of(
+        diagnostics, readings.rigid, rigid_columns(),
+        [](const RigidReading& r) { return cell_of(r.obstacle) + "," + cell_of(r.shape); }));
+  }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
@@ -359,7 +369,7 @@ std::vector<fs::path> Recorder::files() const {
   if (writes_phyxels_) files.push_back(phyxels_.file());
   if (writes_surface_) files.push_back(surface_.file());
   files.push_back(directory_ / log_name);
-  for (const std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_}) {
+  for (const std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_, &rigid_}) {
     if (*log) files.push_back((*log)->file());
   }
   return files;

@@ -23,7 +23,7 @@ constexpr std::size_t largest_log = std::size_t{1} << 30;
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
   for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, reactions_name,
-                          gas_name, contacts_name, probes_name, summary_name}) {
+                          gas_name, contacts_name, rigid_name, probes_name, summary_name}) {
     if (name == one) return true;
   }
   const auto numbered = [name](std::string_view prefix, std::string_view suffix) {

@@ -135,6 +135,10 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
     add(state.get(), std::vector<Mat3d>{obstacle.turn});
     add(state.get(), std::vector<Vec3d>{obstacle.place});
     add_path(state.get(), obstacle.motion);
+    if (!obstacle.free) continue;
+    const auto start = obstacle.start.numbers();
+    add(state.get(), std::vector<double>(start.begin(), start.end()));
+    add(state.get(), std::vector<double>{obstacle.free->mass});
   }
   return XXH3_64bits_digest(state.get());
 }

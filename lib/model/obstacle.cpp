@@ -34,6 +34,61 @@ std::shared_ptr<const Surface> surface_of(const ObstacleRequest& request) {
   return std::make_shared<const Surface>(std::move(surface));
 }
 
+/// What a closed surface holds: the sum over the tetrahedra between the origin and its triangles.
+SolidMoments solid_of(const Surface& surface) {
+  SolidMoments sum;
+  for (const Triangle& t : surface.triangle) {
+    const Vec3d a = surface.position[t[0]], b = surface.position[t[1]], c = surface.position[t[2]];
+    const double six = dot(a, cross(b, c));  // volumes of the tetrahedron
+    const Vec3d s = a + b + c;
+    sum.volume += six / 6;
+    sum.first += (six / 24) * s;
+    const auto add = [&](double& entry, auto&& of) {
+      entry += six / 120 * (of(s) + of(a) + of(b) + of(c));
+    };
+    add(sum.second.xx, [](Vec3d x) { return x.x * x.x; });
+    add(sum.second.xy, [](Vec3d x) { return x.x * x.y; });
+    add(sum.second.xz, [](Vec3d x) { return x.x * x.z; });
+    add(sum.second.yy, [](Vec3d x) { return x.y * x.y; });
+    add(sum.second.yz, [](Vec3d x) { return x.y * x.z; });
+    add(sum.second.zz, [](Vec3d x) { return x.z * x.z; });
+  }
+  return sum;
+}
+
+SolidMoments solid_of(const Obstacle& obstacle) {
+  if (obstacle.surface) return solid_of(*obstacle.surface);
+  return ObstacleShapes::with(obstacle.form, [](const auto& shape) {
+    if constexpr (requires { shape.solid(); }) return shape.solid();
+    return SolidMoments{};
+  });
+}
+
+/// Makes an obstacle a free body.
+void set_free(Obstacle& made, const ObstacleRequest& request) {
+  const SolidMoments solid = solid_of(made);
+  const double density = *request.density, volume = solid.volume;
+  if (!(volume > 0)) {
+    throw InputError(fmt::format(
+        "{}{}obstacle \"{}\" holds {:g} m³, and cannot be free; allowed: a closed surface whose "
+        "triangles look outwards",
+        request.where, request.where.empty() ? "" : ": ", request.name, volume));
+  }
+  const Vec3d m = solid.first / volume;
+  const Sym3d& s = solid.second;
+  const double xx = s.xx - volume * m.x * m.x, yy = s.yy - volume * m.y * m.y,
+               zz = s.zz - volume * m.z * m.z;
+  const Mat3d own{{{yy + zz, volume * m.x * m.y - s.xy, volume * m.x * m.z - s.xz},
+                   {volume * m.x * m.y - s.xy, xx + zz, volume * m.y * m.z - s.yz},
+                   {volume * m.x * m.z - s.xz, volume * m.y * m.z - s.yz, xx + yy}}};
+  const Mat3d i = density * (made.turn * own * transpose(made.turn));
+  made.free = RigidMass{density * volume, made.place + made.turn * m,
+                        {i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2), i(2, 2)}};
+  made.start.place = made.free->centre;
+  made.start.velocity = request.velocity;
+  made.start.angular_momentum = made.free->inertia * request.spin;
+}
+
 Obstacle obstacle_of(const ObstacleRequest& request) {
   Obstacle made{.name = request.name, .hollow = request.hollow, .place = request.translation};
   int index = 0;
@@ -56,7 +111,18 @@ Obstacle obstacle_of(const ObstacleRequest& request) {
   made.law = {request.friction, request.kinetic_friction.value_or(request.friction),
               request.restitution};
   made.motion = motion_along(request.motion);
+  if (request.density) set_free(made, request);
   return made;
+}
+
+/// Where a free body is, as a path.
+Path path_to(const RigidMass& mass, const RigidState& state) {
+  return {state.place - mass.centre, change_by(state.turn), mass.centre};
+}
+
+/// The matrix of ω ×.
+Mat3d spin_of(Vec3d omega) {
+  return {{{0, -omega.z, omega.y}, {omega.z, 0, -omega.x}, {-omega.y, omega.x, 0}}};
 }
 
 /// Sets the rigid motion of a step.
@@ -85,7 +151,7 @@ ObstacleStep Obstacle::step_between(const Path& before, const Path& after, doubl
   step.hollow = hollow;
   step.law = law;
   step.dt = dt;
-  if (dt == 0 || motion.stands_still()) return step;
+  if (dt == 0 || stands_still()) return step;
   step.velocity = (after.at(place) - before.at(place)) / dt;
   step.slope = (1 / dt) * (after.turn - before.turn);
   return step;
@@ -94,7 +160,7 @@ ObstacleStep Obstacle::step_between(const Path& before, const Path& after, doubl
 ObstacleStep Obstacle::step_from(double time, double dt) const {
   const Path after = motion.path_at(time + dt);
   ObstacleStep step = step_between(motion.path_at(time), after, dt);
-  if (dt == 0 || motion.stands_still()) return step;
+  if (dt == 0 || stands_still()) return step;
   set_rigid_motion(step, motion.mean_step(time, dt), dt, motion.path_at(time), after);
   return step;
 }
@@ -102,10 +168,32 @@ ObstacleStep Obstacle::step_from(double time, double dt) const {
 ObstacleStep Obstacle::stage_to(double time, double span) const {
   const Path now = motion.path_at(time);
   ObstacleStep step = step_between(motion.path_at(time - span), now, span);
-  if (span == 0 || motion.stands_still()) return step;
+  if (span == 0 || stands_still()) return step;
   const Path before = motion.path_at(time - span / 2), after = motion.path_at(time + span / 2);
   const Path change{after.displacement - before.displacement, after.turn - before.turn, now.about};
   set_rigid_motion(step, change, span, now, now);
+  return step;
+}
+
+ObstacleStep Obstacle::placed(const RigidState& state) const {
+  const Path here = path_to(*free, state);
+  ObstacleStep step = step_between(here, here, 0);
+  step.drift = state.velocity;
+  step.centre = state.place;
+  step.spin = spin_of(angular_velocity(free->inertia, state));
+  step.velocity = rigid_velocity(step, step.place);
+  step.slope = step.spin * (identity<double>() + here.turn);
+  return step;
+}
+
+ObstacleStep Obstacle::step_between(const RigidState& before, const RigidState& after,
+                                    double dt) const {
+  ObstacleStep step = step_between(path_to(*free, before), path_to(*free, after), dt);
+  step.drift = 0.5 * (before.velocity + after.velocity);
+  RigidState mean = before;
+  mean.angular_momentum = 0.5 * (before.angular_momentum + after.angular_momentum);
+  step.spin = spin_of(angular_velocity(free->inertia, mean));
+  step.centre = after.place;
   return step;
 }
 

@@ -85,6 +85,14 @@ std::vector<SceneKey> obstacle_keys() {
            "comes from its elasticity: 0 is right for most, and 1 returns no more than 0, as what is behind the layer hits it again."},
       {.section = "obstacle", .name = "motion", .type = KeyType::table, .otherwise = "at rest",
        .meaning = "How the obstacle moves."},
+      {.section = "obstacle", .name = "density", .unit = "kg/m^3", .otherwise = "none",
+       .range = between(1e-12, stiffest), .meaning = "Makes it a free rigid body, whose mass and inertia are those of its shape: gravity, "
+           "bodies and other obstacles move it. Of shapes that hold a volume, with Verlet's steps. For two rigid bodies, friction is the "
+           "geometric mean of theirs, and restitution the larger one, of the bodies as a whole."},
+      {.section = "obstacle", .name = "velocity", .type = KeyType::vector, .unit = "m/s", .fallback = "[0, 0, 0]",
+       .range = within(fastest), .meaning = "Of the centre of mass of a free body at the start."},
+      {.section = "obstacle", .name = "spin", .type = KeyType::vector, .unit = "rad/s", .fallback = "[0, 0, 0]",
+       .range = within(fastest), .meaning = "Angular velocity of a free body at the start."},
   };
 }
 

@@ -79,6 +79,17 @@ ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number, Files
   table.read("kinetic_friction", obstacle.kinetic_friction);
   table.read("restitution", obstacle.restitution);
   if (table.has("motion")) read_path(table.table("motion"), obstacle.motion);
+  table.read("density", obstacle.density);
+  for (const char* key : {"velocity", "spin"}) {
+    if (table.has(key) && !obstacle.density) {
+      table.refuse(key, "found without a density; allowed: of a free body, which has one");
+    }
+  }
+  table.read("velocity", obstacle.velocity);
+  table.read("spin", obstacle.spin);
+  if (obstacle.density && table.has("motion")) {
+    table.refuse("density", "found beside obstacle.motion; allowed: one of them");
+  }
   check_obstacle(obstacle);
   return obstacle;
 }
@@ -125,6 +136,13 @@ void check_obstacle(const ObstacleRequest& obstacle) {
   needs_positive("length", obstacle.length);
   if (keys->contains("mesh") && obstacle.mesh.empty()) {
     refuse("mesh", fmt::format("missing; shape = \"{}\" needs it", obstacle.shape));
+  }
+  const bool holds_nothing = obstacle.shape == PlaneObstacle::name || obstacle.hollow;
+  if (obstacle.density && (!(*obstacle.density > 0) || holds_nothing)) {
+    refuse("density",
+           fmt::format("{:g} found; allowed: above 0 kg/m^3, of a shape that holds a volume: no "
+                       "plane, and not hollow",
+                       *obstacle.density));
   }
   if (obstacle.normal && *obstacle.normal == Vec3d{}) {
     refuse("normal", "[0, 0, 0] found; allowed: a direction");

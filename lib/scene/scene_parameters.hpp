@@ -143,6 +143,11 @@ void visit_obstacle(const ObstacleRequest& obstacle, Visit&& visit) {
   }
   visit("obstacle", "restitution", obstacle.restitution);
   visit_path("obstacle.motion", obstacle.motion, visit);
+  if (obstacle.density) {
+    visit("obstacle", "density", *obstacle.density);
+    visit("obstacle", "velocity", obstacle.velocity);
+    visit("obstacle", "spin", obstacle.spin);
+  }
 }
 
 template <class Visit>

@@ -45,7 +45,7 @@ std::vector<SceneSection> boundary_sections() {
        "those on the triangles. The pressure [Pa] of a gas and the volume [m^3] of its cavity are "
        "written at each frame to `gas.csv`, with step, time, body and set, e.g. `traction 1`."},
       {"obstacle", "[[obstacle]]", "",
-       "A rigid body that others cannot enter: a floor, a wall, a bin, a punch. `shape` needs its lengths: `size` of a box, "
+       "A rigid body that others cannot enter: a floor, a wall, a bin, a punch, or, with a `density`, a free body. `shape` needs its lengths: `size` of a box, "
        "`radius` of a sphere, `radius` and `length` of a cylinder or capsule. It is turned, then moved into place, and rests "
        "there or moves along a path. The phyxels on the surface of each body, or, where none lie there, those beside it, are kept "
        "out of it by forces that act where a step would lead them, and that shorten no step. Bodies need a surface, and may touch "
@@ -53,7 +53,8 @@ std::vector<SceneSection> boundary_sections() {
        "obstacle to `contacts.csv`: force [N] and torque [N m] on the bodies at that time, and, since t = 0, impulse [N s], "
        "angular impulse [N m s], work of the obstacle on the bodies [J], heat of friction [J] and loss in impacts [J]; then the depth [m] of "
        "the phyxel that is deepest inside, and the obstacle's place at rest, about which torques are taken. A run stops if phyxels "
-       "and an obstacle move by more than half the obstacle's inner radius, or half a support, against each other in a step."},
+       "and an obstacle move by more than half the obstacle's inner radius, or half a support, against each other in a step. Each frame adds a line for each free body to `rigid.csv`: place of its centre of mass [m], "
+       "rotation from its position at rest [rad], axis times angle, velocity [m/s], angular velocity [rad/s], kinetic energy [J]."},
       {"obstacle.motion", "[obstacle.motion]", "",
        "The path of the obstacle above, as that of a `[[body.motion]]`. At least one of `displacement`, `rotation`, `velocity` and "
        "`amplitude` is needed."},

@@ -56,6 +56,7 @@ NextStep next_step(const Model& model, Backend& backend, const SupportInstant& n
       bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
   State next = next_state(model, now, state, layer);
   NextStep made;
+  contacts.put_rigid(state.rigid, now.dt);
   contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
   if (bodies.acts()) {
     const auto of = [](const State& s) {
@@ -128,6 +129,16 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   return rates;
 }
 
+/// The obstacles at a time [s], free ones in their states.
+PlacedObstacles obstacles_now(const Model& model, double time, std::span<const RigidState> rigid) {
+  PlacedObstacles placed;
+  std::size_t free = 0;
+  for (const Obstacle& obstacle : model.obstacles) {
+    placed.push_back(obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(time, 0));
+  }
+  return placed;
+}
+
 /// Depths of the deepest phyxel of the contact layer in each obstacle [m], 0 if none is inside. Of
 /// a share: collective.
 std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver,
@@ -139,12 +150,14 @@ std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver
                                     : PlacedObstacles{};
   const std::vector<LayerGroup> groups = groups_of(model, model.contact);
   const PlacedLayer layer(model, groups, [&](Index i) { return state.displacement[i]; });
+  const PlacedObstacles now =
+      after.empty() ? obstacles_now(model, solver.time(), state.rigid) : after;
   for (std::size_t o = 0; o < depths.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     double& deepest = depths[o];
-    layer.for_each_inside(
-        obstacle, after.empty() ? obstacle.step_from(solver.time(), 0) : after[o],
-        [&](std::size_t, Vec3d, const Gap& gap) { deepest = std::max(deepest, -gap.distance); });
+    layer.for_each_inside(obstacle, now[o], [&](std::size_t, Vec3d, const Gap& gap) {
+      deepest = std::max(deepest, -gap.distance);
+    });
     if (model.share) deepest = model.share->communicator->largest(deepest);
   }
   return depths;
@@ -174,6 +187,24 @@ double smallest_support(const Model& model) {
   throw DivergedError(why);
 }
 
+/// Ends a run in which a free body has gone, or turns by more than a radian in a step.
+void check_rigid(const Model& model, std::span<const RigidState> rigid) {
+  std::size_t free = 0;
+  for (const Obstacle& obstacle : model.obstacles) {
+    if (!obstacle.free || free == rigid.size()) continue;
+    const auto numbers = rigid[free++].numbers();
+    if (std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); })) {
+      continue;
+    }
+    say_wrong(
+        model,
+        fmt::format("the simulation diverged: the state of the free body \"{}\" is not finite; "
+                    "it is too light for what it touches, or turns by more than a radian in a "
+                    "step: allowed is a smaller time.step",
+                    obstacle.name));
+  }
+}
+
 /// Refuses readings of phyxels that an obstacle has left inside another one, or that it cannot
 /// hold.
 void check_depths(const Model& model, const std::vector<ContactReading>& readings) {
@@ -196,7 +227,9 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
 
 }  // namespace
 
-void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed) {
+void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
+                          std::span<const RigidState> rigid) {
+  check_rigid(model, rigid);
   if (touching_count(model) == 0 || solver.method() == Method::equilibrium) return;
   const double dt = solver.dt(), support = smallest_support(model);
   if (const double way = 2 * largest_speed * dt; model.body_contact.acts() && way > 0.5 * support) {
@@ -208,8 +241,10 @@ void check_contact_speeds(const Model& model, const Solver& solver, double large
                     "{:.3g} s (time.step, time.safety), or lower speeds",
                     largest_speed, way, dt, 0.5 * support, 0.25 * support / largest_speed));
   }
+  std::size_t free = 0;
   for (const Obstacle& obstacle : model.obstacles) {
-    const double of_obstacle = obstacle.largest_speed(obstacle.step_from(solver.time(), dt));
+    const double of_obstacle = obstacle.largest_speed(
+        obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(solver.time(), dt));
     const double speed = largest_speed + of_obstacle;
     const double most = 0.5 * std::min(obstacle.inner_radius(), support);
     if (!(speed * dt > most)) continue;

@@ -49,8 +49,14 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
   Index size() const override { return model_.size(); }
 
-  void put(const State& state) override { this->put_state(state); }
-  void download(State& state) const override { this->get_state(state); }
+  void put(const State& state) override {
+    this->put_state(state);
+    contacts_.put_rigid(state.rigid, state.dt);
+  }
+  void download(State& state) const override {
+    this->get_state(state);
+    state.rigid = contacts_.rigid_states();
+  }
 
   std::optional<StateView> view() const override {
     return StateView{displacement_.data(),
@@ -89,6 +95,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     sums.insert(sums.end(), body_contacts_.sums().begin(), body_contacts_.sums().end());
     return words_of(std::move(sums));
   }
+
+  std::vector<RigidState> rigid_states() const override { return contacts_.rigid_states(); }
 
   void put_displacements(std::span<const Vec3d> displacement) override {
     check_displacements(displacement, model_.size());
@@ -232,6 +240,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
       if (&runs == &boundary_runs_) end_step(time, dt, true);  // before they are sent
     });
     end_step(time, dt, false);
+    contacts_.end_step();
     this->clear_padding();
   }
   /// The same where bodies touch each other: phyxels of all ranks are led to the end of the step
@@ -252,6 +261,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
       this->set_state(i, to.displacement, to.velocity);
     });
     contacts_.keep_out([](Index) { return true; }, touched(), touch());
+    contacts_.end_step();
     if (model_.share) this->refresh(this->displacement_records());
     this->clear_padding();
   }

@@ -18,6 +18,7 @@
 #include "solver/following_loads.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/part_law.hpp"
+#include "solver/rigid_bodies.hpp"
 #include "solver/step_sums.hpp"
 #include "solver/totals.hpp"
 
@@ -128,6 +129,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     d = all.values();
   }
   d->load_energy += energy_of_following(model, backend, now.time);
+  add_rigid(model, backend.rigid_states(), now.lag, *d);
   d->step = now.step;
   d->time = now.time;
   return *d;
@@ -144,8 +146,8 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver)
     loss.add(all[first + ContactTerms::friction_heat].value());
     loss.add(all[first + ContactTerms::impact_loss].value());
   }
-  d.contact_loss = loss.value();
-  check_contact_speeds(model, solver, d.largest_speed);
+  d.contact_loss += loss.value();
+  check_contact_speeds(model, solver, d.largest_speed, backend.rigid_states());
   return d;
 }
 

@@ -80,6 +80,15 @@ void refuse_contact(const Model& model, Method method) {
     throw InputError(why);
   };
   for (const Obstacle& obstacle : model.obstacles) {
+    if (obstacle.free) {
+      const std::string why = fmt::format(
+          "obstacle.density of obstacle \"{}\", a free rigid body, found with solver.method = "
+          "\"{}\"; "
+          "allowed with this method: obstacles at rest or on a path",
+          obstacle.name, method_name(method));
+      if (model.share) throw AgreedError(ExitCode::bad_input, why);
+      throw InputError(why);
+    }
     check(obstacle.law, "obstacle", fmt::format(" of obstacle \"{}\"", obstacle.name));
   }
   if (!model.body_contact.acts()) return;

@@ -64,7 +64,7 @@ bool is_conservative(const Model& model) {
     if (!motion.stands_still()) return false;
   }
   for (const Obstacle& obstacle : model.obstacles) {
-    if (!obstacle.motion.stands_still()) return false;
+    if (!obstacle.motion.stands_still()) return false;  // free bodies count among the energies
   }
   return true;
 }
@@ -94,6 +94,7 @@ StabilityWatch::StabilityWatch(const Model& model, const Diagnostics& start,
   }
   for (const Obstacle& obstacle : model.obstacles) {
     driving_speed_ += largest_speed(model, obstacle.motion, model.contact.phyxels);
+    if (obstacle.free) driving_speed_ += obstacle.largest_speed(obstacle.placed(obstacle.start));
   }
   check(start);
 }

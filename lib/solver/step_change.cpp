@@ -139,6 +139,7 @@ void Solver::change_step(std::int64_t steps, double dt) {
     const Vec3d earlier = velocity_before(v[i], after[i], damping, dt / 2);
     state.velocity[i] += accelerations.free(i, earlier - state.velocity[i]);
   });
+  for (RigidState& body : state.rigid) body.velocity += ((dt_ - dt) / 2) * model_->gravity;
   first_step_ += steps - steps_;  // the number of steps taken does not change
   state.step = steps_ = steps;
   const double step_before = dt_;

@@ -13,6 +13,7 @@
 #include "model/parts.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/obstacles.hpp"
+#include "solver/rigid_bodies.hpp"
 #include "solver/step_sums.hpp"
 
 namespace phyxel {
@@ -54,11 +55,16 @@ class StepContacts {
         free_(free_axes_of_layer(model)),
         before_(model.contact.phyxels.size()),
         groups_(groups_of(model, model.contact)),
-        near_(groups_.size()) {
+        near_(groups_.size()),
+        rigid_(model) {
     for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
-      if (!model.obstacles[o].motion.stands_still()) moving_.push_back(o);
+      if (!model.obstacles[o].stands_still()) moving_.push_back(o);
     }
   }
+
+  /// Sets the states of free bodies, as of `RigidBodies::put`.
+  void put_rigid(std::span<const RigidState> states, double dt) { rigid_.put(states, dt); }
+  const std::vector<RigidState>& rigid_states() const { return rigid_.states(); }
 
   /// Prepares for a step, which has not changed velocities yet.
   /// @param velocity_of returns the velocity of a phyxel [m/s]
@@ -73,7 +79,11 @@ class StepContacts {
         steps_.push_back(obstacle.step_from(time, dt));
       }
     }
-    for (const std::size_t o : moving_) steps_[o] = model_.obstacles[o].step_from(time, dt);
+    rigid_.begin_step(time, dt);
+    for (const std::size_t o : moving_) {
+      const Obstacle& obstacle = model_.obstacles[o];
+      steps_[o] = obstacle.free ? rigid_.step_of(o) : obstacle.step_from(time, dt);
+    }
 #pragma omp parallel for schedule(static) num_threads(threads_here())
     for (std::size_t k = 0; k < before_.size(); ++k) {
       before_[k] = velocity_of(model_.contact.phyxels[k]);
@@ -100,6 +110,8 @@ class StepContacts {
       }
     }
   }
+  /// Ends a step, after all phyxels have been kept out. Of a share: collective.
+  void end_step() { rigid_.end_step(sums_); }
   /// The sums so far, obstacle by obstacle (`ContactTerms`).
   const StepSums& sums() const { return sums_; }
   /// Bytes of its arrays.
@@ -132,7 +144,7 @@ class StepContacts {
     near.obstacles = moving_;
     for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
       const Obstacle& obstacle = model_.obstacles[o];
-      if (!obstacle.motion.stands_still()) continue;
+      if (!obstacle.stands_still()) continue;
       if (!is_clear_of(obstacle, steps_[o], near.box, group.offset)) near.obstacles.push_back(o);
     }
     std::sort(near.obstacles.begin(), near.obstacles.end());
@@ -201,6 +213,7 @@ class StepContacts {
   std::vector<LayerGroup> groups_;
   std::vector<NearObstacles> near_;  // of each group
   std::vector<std::size_t> moving_;  // obstacles that do not stand still
+  RigidBodies rigid_;
   double dt_ = 0;                    // of `inertia_` [s]
 };
 

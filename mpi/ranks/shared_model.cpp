@@ -131,6 +131,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   };
   Header now{};
   std::vector<std::int64_t> step_sums;
+  std::vector<RigidState> rigid;
   ranks_.collectively([&] {
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time; allowed: 1 or more", length));
@@ -141,6 +142,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     const State header = checkpoint->state(0, 0);
     now = {header.step, header.time, header.dt, header.history_interval, header.looks};
     step_sums = header.step_sums;
+    rigid = header.rigid;
   });
   if (!here_.share) return checkpoint->state(0, here_.size());
   State state = exchange_->scattered(
@@ -152,6 +154,7 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   state.history_interval = now.history_interval;
   state.looks = now.looks;
   state.step_sums = ranks_.communicator().broadcast(step_sums);
+  state.rigid = ranks_.communicator().broadcast(rigid);
   return state;
 }
 

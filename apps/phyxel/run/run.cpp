@@ -203,7 +203,8 @@ Readings Run::read_off() {
   return spent_.timed("energies", [&] {
     Readings found{
         find_reactions(model(), *backend_, solver_), probes_.read(*backend_, recovery_.get()),
-        read_gases(model(), *backend_, solver_), find_contacts(model(), *backend_, solver_)};
+        read_gases(model(), *backend_, solver_), find_contacts(model(), *backend_, solver_),
+        read_rigid_bodies(model(), *backend_, solver_)};
     deepest_.resize(found.contacts.size());
     for (std::size_t k = 0; k < deepest_.size(); ++k) {
       deepest_[k] = std::max(deepest_[k], found.contacts[k].depth);

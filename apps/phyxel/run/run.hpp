@@ -170,6 +170,7 @@ class Run {
   void say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic& traffic) const;
   /// Prints what obstacles do at the end, and have done.
   void say_contacts() const;
+  void say_rigid_bodies() const;
   /// Prints the reactions at the end.
   void say_reactions() const;
   /// Prints what probes read at the end.

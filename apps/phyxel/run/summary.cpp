@@ -91,6 +91,20 @@ nlohmann::ordered_json json_of(const std::vector<ContactReading>& contacts,
   return list;
 }
 
+nlohmann::ordered_json json_of(const std::vector<RigidReading>& bodies) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const RigidReading& body : bodies) {
+    list.push_back({{"obstacle", body.obstacle},
+                    {"shape", body.shape},
+                    {"place_m", json_of(body.place)},
+                    {"rotation_rad", json_of(body.rotation)},
+                    {"velocity_m_s", json_of(body.velocity)},
+                    {"spin_rad_s", json_of(body.spin)},
+                    {"kinetic_energy_j", body.kinetic_energy}});
+  }
+  return list;
+}
+
 nlohmann::ordered_json json_of(const std::vector<ProbeReading>& readings) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const ProbeReading& r : readings) {
@@ -261,6 +275,7 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"probes", json_of(readings_.probes)},
             {"gases", json_of(readings_.gases)},
             {"contacts", json_of(readings_.contacts, deepest_)},
+            {"rigid_bodies", json_of(readings_.rigid)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},
             {"directory", recorder_->directory().string()},
@@ -293,6 +308,19 @@ void Run::say_gases() const {
                gas.pressure, gas.volume);
   }
   say_left_out(readings_.gases.size(), "more: gas.csv");
+}
+
+void Run::say_rigid_bodies() const {
+  const std::size_t printed = std::min(readings_.rigid.size(), most_printed);
+  for (std::size_t k = 0; k < printed; ++k) {
+    const RigidReading& r = readings_.rigid[k];
+    fmt::print(
+        "  free body   {}: centre at ({:.4g}, {:.4g}, {:.4g}) m, velocity ({:.4g}, {:.4g}, {:.4g}) "
+        "m/s, spin ({:.4g}, {:.4g}, {:.4g}) rad/s\n",
+        r.obstacle, r.place.x, r.place.y, r.place.z, r.velocity.x, r.velocity.y, r.velocity.z,
+        r.spin.x, r.spin.y, r.spin.z);
+  }
+  say_left_out(readings_.rigid.size(), "more: rigid.csv");
 }
 
 void Run::say_contacts() const {
@@ -393,6 +421,7 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
   say_probes();
   say_gases();
   say_contacts();
+  say_rigid_bodies();
   if (now.inverted > 0) {
     fmt::print(
         "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "

@@ -131,7 +131,7 @@ class _Family:
 class Trajectory:
     """What a run has written: `phyxels` and `surface`, frames each, `energy`, the columns of
     energy.csv, `reactions`, those of reactions.csv, `probes`, those of probes.csv, `gases`,
-    those of gas.csv, and `contacts`, those of contacts.csv.
+    those of gas.csv, `contacts`, those of contacts.csv, and `rigid_bodies`, those of rigid.csv.
 
         trajectory = phyxel.Trajectory("out/dino")
         for frame in trajectory.surface: ...
@@ -175,6 +175,13 @@ class Trajectory:
         """{obstacle: {column: values}}, one for each frame; forces [N], torques [N m], impulses [N s],
         angular impulses [N m s], work, heat and loss [J]. Empty without any."""
         return {name: columns for (name, _), columns in self._log("contacts.csv", str).items()}
+
+    @property
+    def rigid_bodies(self):
+        """{obstacle: {column: values}}, one for each frame, of obstacles that are free rigid bodies:
+        place [m] of the centre of mass, rotation [rad] from the position at rest, velocity [m/s],
+        spin [rad/s], kinetic energy [J]. Empty without any."""
+        return {name: columns for (name, _), columns in self._log("rigid.csv", str).items()}
 
     @property
     def probes(self):

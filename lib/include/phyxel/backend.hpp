@@ -124,6 +124,8 @@ class Backend {
   /// t + dt adds its reactions times half the displacements over both steps beside t. Empty if no
   /// phyxel moves on a prescribed path, and then steps cost nothing more.
   virtual std::vector<std::int64_t> step_sums() const { return {}; }
+  /// The states of the free rigid bodies, as of `State::rigid`; the same on all ranks.
+  virtual std::vector<RigidState> rigid_states() const { return {}; }
 
   /// The most steps that one call of `step` makes cheaper: a device is busy with them while the
   /// caller does something else.

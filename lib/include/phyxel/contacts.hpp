@@ -25,6 +25,31 @@ struct ContactReading {
   Vec3d place;               ///< The obstacle's place at rest [m].
 };
 
+/// Where a free rigid body is and how it moves, at the time of the solver.
+struct RigidReading {
+  std::string obstacle;       ///< Its name.
+  std::string shape;          ///< The name of its shape, e.g. "sphere".
+  Vec3d place;                ///< Of its centre of mass [m].
+  Vec3d rotation;             ///< From its position at rest: axis times angle, at most π [rad].
+  Vec3d velocity;             ///< Of its centre of mass [m/s].
+  Vec3d spin;                 ///< Angular velocity [rad/s].
+  double kinetic_energy = 0;  ///< [J]
+};
+
+/// The free rigid bodies of a model, in the order of its obstacles; none, at no cost, for a model
+/// without any.
+std::vector<RigidReading> read_rigid_bodies(const Model& model, const Backend& backend,
+                                            const Solver& solver);
+
+/// A number of such a reading: a column of `rigid.csv`.
+struct RigidColumn {
+  const char* name;
+  const char* unit;
+  double (*value)(const RigidReading&);
+};
+/// The numbers of such a reading, in the order of the columns.
+std::span<const RigidColumn> rigid_columns();
+
 /// The name of an obstacle's shape in scenes.
 const char* shape_name(const Obstacle& obstacle);
 
@@ -40,8 +65,11 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
 /// Refuses speeds at which phyxels and obstacles might pass through each other in a step: more than
 /// half of the obstacle's inner radius, or of a support. Of a share: collective.
 /// @param largest_speed of the phyxels of all ranks [m/s]
-/// @throws DivergedError naming the obstacle, the speeds, and the largest step allowed
-void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed);
+/// @param rigid states of the free bodies
+/// @throws DivergedError naming the obstacle, the speeds, and the largest step allowed; or the free
+///   body whose state is not finite
+void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
+                          std::span<const RigidState> rigid);
 
 /// A number of a reading: a column of `contacts.csv`.
 struct ContactColumn {

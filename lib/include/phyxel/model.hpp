@@ -14,6 +14,7 @@
 #include "phyxel/load_curve.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "phyxel/physics/contact.hpp"
+#include "phyxel/rigid.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/share.hpp"
 #include "phyxel/space_region.hpp"
@@ -125,8 +126,14 @@ struct Obstacle {
   Vec3d place;          ///< Where its origin is at rest [m].
   ContactLaw law;
   Motion motion;  ///< Its path; no phyxels follow it.
+  /// Set for a free rigid body, which has no path: forces move it.
+  std::optional<RigidMass> free;
+  RigidState start;  ///< Of a free body: its state at t = 0.
 
-  /// Where it is at the end of the step of `dt` [s] that begins at `time` [s], and how it moves.
+  /// True if it is where it is at rest at all times.
+  bool stands_still() const { return !free && motion.stands_still(); }
+  /// Where it is at the end of the step of `dt` [s] that begins at `time` [s], and how it moves. A
+  /// free body is at rest.
   ObstacleStep step_from(double time, double dt) const;
   /// Where it is at the end of a step between two places on its path, and how it moves.
   /// @param dt size of the step [s]; 0: it is at the later place, and does not move
@@ -134,6 +141,11 @@ struct Obstacle {
   /// Where it is at the end of a stage of `span` [s] of an implicit step that ends at `time` [s],
   /// and how it moves then.
   ObstacleStep stage_to(double time, double span) const;
+  /// Where a free body in a state is, and how it moves.
+  ObstacleStep placed(const RigidState& state) const;
+  /// Where a free body is at the end of the step between two states, and how it moves.
+  /// @param dt size of the step [s]
+  ObstacleStep step_between(const RigidState& before, const RigidState& after, double dt) const;
   /// Finds the distances from the surface of a mesh, without which it cannot be touched.
   /// @param spacing of nodes near the surface [m]; they are farther apart if that would be too many
   /// @param band distance from the surface up to which they are as near [m]

@@ -27,6 +27,7 @@ struct Readings {
   std::vector<ProbeReading> probes;      ///< Of the scene's probes (`Probes::read`), or none.
   std::vector<GasReading> gases;         ///< Of gases in cavities (`read_gases`), or none.
   std::vector<ContactReading> contacts;  ///< Of obstacles (`find_contacts`), or none.
+  std::vector<RigidReading> rigid;       ///< Of free rigid bodies (`read_rigid_bodies`), or none.
 };
 
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
@@ -131,6 +132,7 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   probes.csv                                 of a scene with probes: one line a frame and point
 ///   gas.csv                                    of a scene with gases: one line a frame and gas
 ///   contacts.csv                               one line a frame and obstacle, if there are any
+///   rigid.csv                                  one line a frame and free rigid body, likewise
 ///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
@@ -184,7 +186,7 @@ class Recorder {
   std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
   std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
   // Set if the model has supports, probes, gases, and obstacles.
-  std::optional<FrameLog> reactions_, probes_, gases_, contacts_;
+  std::optional<FrameLog> reactions_, probes_, gases_, contacts_, rigid_;
 
   /// Those of them that are set.
   std::vector<FrameLog*> logs();

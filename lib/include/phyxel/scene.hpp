@@ -201,7 +201,7 @@ struct BodyRequest {
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 
-/// A rigid body that others cannot enter, at rest or on a given path.
+/// A rigid body that others cannot enter, at rest, on a given path, or free.
 struct ObstacleRequest {
   std::string name;
   std::string shape;            ///< A name in `ObstacleShapes` (phyxel/physics/obstacles.hpp).
@@ -219,7 +219,10 @@ struct ObstacleRequest {
   double restitution = 0;  ///< Speed of a surface point after an impact over that before.
   /// How it moves, but for the selection and the axes; nothing set: it is at rest.
   MotionRequest motion;
-  std::string where;  ///< "scene.toml:30:1", for errors.
+  std::optional<double> density;  ///< Of a free rigid body [kg/m³]; unset: forces do not move it.
+  Vec3d velocity;                 ///< Of the centre of mass of a free body at t = 0 [m/s].
+  Vec3d spin;                     ///< Angular velocity of a free body at t = 0 [rad/s].
+  std::string where;              ///< "scene.toml:30:1", for errors.
 };
 
 /// Two bodies that touch each other in a way of their own.

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "phyxel/rigid.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -66,6 +67,8 @@ struct State {
   /// What supports and obstacles have done in earlier steps, by the rule of `Solver::step_sums`:
   /// words of exact sums over all ranks. Empty if no support moves and there is no obstacle.
   std::vector<std::int64_t> step_sums;
+  /// Those of the free rigid bodies, in the order of the model's obstacles. Empty: as they start.
+  std::vector<RigidState> rigid;
 };
 
 /// Time level of a backend's state. Velocities are stored at `time - lag` (lag is dt/2 for

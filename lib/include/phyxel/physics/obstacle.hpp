@@ -8,6 +8,8 @@
 ///                                                   surface from a file, its `DistanceField`
 ///   gap(x)                       distance of a point from the surface, and the direction away from
 ///   it
+///   solid()                      volume, centre and moments, of shapes that may be free bodies
+///   for_each_tip(each)           balls by which it touches other rigid bodies; likewise
 #pragma once
 
 #include <array>
@@ -40,6 +42,19 @@ struct ObstacleForm {
   int shape = 0;                                        ///< Index in `ObstacleShapes`.
   std::array<double, most_obstacle_lengths> lengths{};  ///< Of the shape, in its order [m].
   DistanceField field{};                                ///< Of a surface from a file.
+};
+
+/// Volume of a solid, and how that is spread, in the shape's own coordinates.
+struct SolidMoments {
+  double volume = 0;  ///< [m³]
+  Vec3d first;        ///< ∫ x dV [m⁴].
+  Sym3d second;       ///< ∫ x xᵀ dV [m⁵].
+
+  /// Those of a solid that is symmetric about the origin's planes.
+  /// @param squares means of x², y² and z² [m²]
+  static SolidMoments about_origin(double volume, Vec3d squares) {
+    return {volume, {}, {volume * squares.x, 0, 0, volume * squares.y, 0, volume * squares.z}};
+  }
 };
 
 /// The distance from a convex shape given by a point's distances beyond its faces along two or

@@ -24,6 +24,27 @@ struct BoxObstacle {
         {x.x < 0 ? -1.0 : 1.0, 0, 0}, {0, x.y < 0 ? -1.0 : 1.0, 0}, {0, 0, x.z < 0 ? -1.0 : 1.0}};
     return gap_of_faces(beyond, direction);
   }
+  /// What it holds (`SolidMoments`).
+  SolidMoments solid() const {
+    return SolidMoments::about_origin(
+        size_x * size_y * size_z,
+        {size_x * size_x / 12, size_y * size_y / 12, size_z * size_z / 12});
+  }
+  /// Calls each(x, radius) for the balls by which it touches other rigid bodies: they reach its
+  /// surface where it sticks out.
+  template <class Each>
+  void for_each_tip(Each&& each) const {
+    constexpr int parts = 4;  // of an edge
+    for (int i = 0; i <= parts; ++i) {
+      for (int j = 0; j <= parts; ++j) {
+        for (int k = 0; k <= parts; ++k) {
+          if (i % parts != 0 && j % parts != 0 && k % parts != 0) continue;  // not on a face
+          const auto at = [](int n, double size) { return (n / double{parts} - 0.5) * size; };
+          each(Vec3d{at(i, size_x), at(j, size_y), at(k, size_z)}, 0.0);
+        }
+      }
+    }
+  }
 };
 
 }  // namespace phyxel

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <numbers>
 
 #include "phyxel/physics/obstacle.hpp"
 
@@ -23,6 +24,28 @@ struct CylinderObstacle {
     const Vec3<double> out = x.x == 0 && x.y == 0 ? Vec3<double>{1, 0, 0} : side.normal;
     const Vec3<double> direction[] = {out, {0, 0, x.z < 0 ? -1.0 : 1.0}};
     return gap_of_faces(beyond, direction);
+  }
+  /// What it holds (`SolidMoments`).
+  SolidMoments solid() const {
+    const double across = radius * radius / 4;
+    return SolidMoments::about_origin(std::numbers::pi * radius * radius * length,
+                                      {across, across, length * length / 12});
+  }
+  /// Calls each(x, radius) for the balls by which it touches other rigid bodies: they reach its
+  /// surface where it sticks out.
+  template <class Each>
+  void for_each_tip(Each&& each) const {
+    constexpr int around = 96, parts = 4;  // rolls as smoothly as a polygon of so many sides
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * std::numbers::pi * k / around;
+      const Vec3d out{std::cos(angle), std::sin(angle), 0};
+      const auto at = [&](double r, int n) {
+        return Vec3d{r * out.x, r * out.y, (n / double{parts} - 0.5) * length};
+      };
+      for (int n = 0; n <= parts; ++n) each(at(radius, n), 0.0);
+      if (k % 12 != 0) continue;  // the ends
+      for (int n = 0; n <= parts; n += parts) each(at(radius / 2, n), 0.0);
+    }
   }
 };
 

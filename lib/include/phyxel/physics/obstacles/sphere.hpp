@@ -1,6 +1,8 @@
 /// A ball as an obstacle.
 #pragma once
 
+#include <numbers>
+
 #include "phyxel/physics/obstacle.hpp"
 
 namespace phyxel {
@@ -15,6 +17,18 @@ struct SphereObstacle {
 
   /// The distance of a point in the shape's own coordinates from its surface.
   PHYXEL_HD Gap gap(Vec3<double> x) const { return gap_of_sphere(x, radius); }
+  /// What it holds (`SolidMoments`).
+  SolidMoments solid() const {
+    const double volume = 4.0 / 3 * std::numbers::pi * radius * radius * radius,
+                 square = radius * radius / 5;
+    return SolidMoments::about_origin(volume, {square, square, square});
+  }
+  /// Calls each(x, radius) for the balls by which it touches other rigid bodies: they reach its
+  /// surface where it sticks out.
+  template <class Each>
+  void for_each_tip(Each&& each) const {
+    each(Vec3d{}, radius);
+  }
 };
 
 }  // namespace phyxel

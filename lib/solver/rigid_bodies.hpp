@@ -1,0 +1,53 @@
+/// The free rigid bodies of a model in steps of Verlet's method.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "phyxel/model.hpp"
+#include "phyxel/state.hpp"
+#include "solver/rigid_contacts.hpp"
+#include "solver/step_sums.hpp"
+
+namespace phyxel {
+
+/// Moves free bodies step by step. A step adds gravity to their velocities, keeps them out of each
+/// other and of other obstacles, and moves them; then phyxels are kept out of them, as out of
+/// obstacles on a path, and what that takes acts back on them in the next step. So phyxels stick to them as to something at rest, and both momenta of all
+/// bodies are kept to rounding. All ranks do the same.
+class RigidBodies {
+ public:
+  /// @param model must outlive this
+  explicit RigidBodies(const Model& model);
+
+  /// True in scenes without free bodies.
+  bool empty() const { return bodies_.empty(); }
+  /// Sets the states. @param states none: as they start. @param dt size of the step [s]
+  /// @throws InputError for another number of states than of free bodies
+  void put(std::span<const RigidState> states, double dt);
+  const std::vector<RigidState>& states() const { return states_; }
+
+  /// Moves the bodies over the step from `time` [s].
+  void begin_step(double time, double dt);
+  /// Where an obstacle that is a free body is at the end of the step, and how it moves.
+  const ObstacleStep& step_of(std::size_t obstacle) const { return steps_[number_[obstacle]]; }
+  /// Lets what the step has done to phyxels act back. Of a share: collective.
+  /// @param sums of all obstacles and steps so far, of this rank (`ContactTerms`)
+  void end_step(std::span<const ExactSum> sums);
+
+ private:
+  const Model& model_;
+  std::vector<std::size_t> bodies_;  // obstacles that are free bodies
+  std::vector<std::size_t> number_;  // of each obstacle among these
+  std::vector<RigidState> states_;
+  std::vector<ObstacleStep> steps_;  // of the present step
+  StepSums earlier_;                 // impulses and angular impulses before the present step
+  RigidContacts contacts_;
+};
+
+/// Adds the energies and momenta of free bodies to those of the phyxels.
+/// @param lag time from the velocities of the states to their places [s]
+void add_rigid(const Model& model, std::span<const RigidState> states, double lag,
+               Diagnostics& sums);
+
+}  // namespace phyxel
