@@ -34,7 +34,14 @@ std::shared_ptr<const Surface> surface_of(const ObstacleRequest& request) {
   return std::make_shared<const Surface>(std::move(surface));
 }
 
-Obstacle obstacle_of(const ObstacleRequest& request) {
+/// The stiffness of penalties of an obstacle, or 0.
+/// @param shared the [contact] of the scene
+double penalty_of(const ObstacleRequest& request, const ContactRequest& shared) {
+  const bool acts = request.method.value_or(shared.method) == ContactMethod::penalty;
+  return acts ? request.stiffness.value_or(shared.stiffness) : 0;
+}
+
+Obstacle obstacle_of(const ObstacleRequest& request, const ContactRequest& shared) {
   Obstacle made{.name = request.name, .hollow = request.hollow, .place = request.translation};
   int index = 0;
   ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) {
@@ -55,6 +62,7 @@ Obstacle obstacle_of(const ObstacleRequest& request) {
       request.normal ? turn_of_normal(*request.normal) : rotation_by(degree * request.rotation);
   made.law = {request.friction, request.kinetic_friction.value_or(request.friction),
               request.restitution};
+  made.penalty = penalty_of(request, shared);
   made.motion = motion_along(request.motion);
   return made;
 }
@@ -74,7 +82,10 @@ void set_rigid_motion(ObstacleStep& step, const Path& change, double span, const
 
 std::vector<Obstacle> obstacles_of(const Scene& scene) {
   std::vector<Obstacle> all;
-  for (const ObstacleRequest& request : scene.obstacles) all.push_back(obstacle_of(request));
+  const ContactRequest shared = scene.contact.value_or(ContactRequest{});
+  for (const ObstacleRequest& request : scene.obstacles) {
+    all.push_back(obstacle_of(request, shared));
+  }
   return all;
 }
 
