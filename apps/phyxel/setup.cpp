@@ -151,6 +151,11 @@ std::vector<SupportRange> support_ranges(const Model& model) {
 
 namespace {
 
+/// The stiffness of penalties, in words; empty if projected.
+std::string describe_penalty(double penalty) {
+  return penalty > 0 ? fmt::format(", penalties of stiffness {:g}", penalty) : "";
+}
+
 /// Lines about obstacles and about contact of bodies, and how many phyxels may touch them.
 std::string describe_contact(const Model& model, std::int64_t touching,
                              std::int64_t touching_bodies) {
@@ -159,13 +164,17 @@ std::string describe_contact(const Model& model, std::int64_t touching,
   for (std::size_t k = 0; k < std::min(model.obstacles.size(), most); ++k) {
     const Obstacle& o = model.obstacles[k];
     text += fmt::format(
-        "  obstacle    {}: {}{}{} at [{:.4g}, {:.4g}, {:.4g}] m; friction {:g}{}{}\n", o.name,
-        o.hollow ? "hollow " : "", shape_name(o), o.free ? ", free" : o.motion.stands_still() ? "" : ", moving",
+        "  obstacle    {}: {}{}{} at [{:.4g}, {:.4g}, {:.4g}] m; friction {:g}{}{}{}\n", o.name,
+        o.hollow ? "hollow " : "", shape_name(o),
+        o.free                    ? ", free"
+        : o.motion.stands_still() ? ""
+                                  : ", moving",
         o.place.x, o.place.y, o.place.z, o.law.static_friction,
         o.law.kinetic_friction < o.law.static_friction
             ? fmt::format(", {:g} when sliding", o.law.kinetic_friction)
             : "",
-        o.law.restitution > 0 ? fmt::format(", restitution {:g}", o.law.restitution) : "");
+        o.law.restitution > 0 ? fmt::format(", restitution {:g}", o.law.restitution) : "",
+        describe_penalty(o.penalty));
   }
   if (model.obstacles.size() > most) {
     text += fmt::format("              and {} more obstacles\n", model.obstacles.size() - most);
@@ -180,12 +189,15 @@ std::string describe_contact(const Model& model, std::int64_t touching,
                                     : fmt::format("{} pair{} of bodies", contact.pairs.size(),
                                                   contact.pairs.size() == 1 ? "" : "s");
     if (contact.self) which += ", and each body itself";
-    text += fmt::format("  contact     {}; friction {:g}{}{}; {} phyxels of surfaces may touch\n",
+    text += fmt::format("  contact     {}; friction {:g}{}{}{}; {} phyxels of surfaces may touch\n",
                         which, contact.law.static_friction,
                         contact.law.restitution > 0
                             ? fmt::format(", restitution {:g}", contact.law.restitution)
                             : "",
-                        contact.sweeps > 1 ? fmt::format("; {} sweeps a step", contact.sweeps) : "",
+                        describe_penalty(contact.penalty),
+                        contact.penalty > 0  ? ""
+                        : contact.sweeps > 1 ? fmt::format("; {} sweeps a step", contact.sweeps)
+                                             : "",
                         touching_bodies);
   }
   return text;

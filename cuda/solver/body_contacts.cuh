@@ -10,6 +10,8 @@
 
 #include "model/parts.hpp"
 #include "solver/body_contacts.hpp"
+#include "solver/contact_stiffness.hpp"
+#include "solver/contacts.cuh"
 #include "solver/device_distances.cuh"
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
@@ -35,16 +37,6 @@ struct SurfacePlaces {
   PointForces* forces = nullptr;     ///< Of all sweeps of the step.
   int count = 0;
 };
-
-/// The displacement of a place, as precisely as the state has it [m].
-template <class Real, class StateReal>
-__device__ Vec3<double> displacement_at(const Fields<Real, StateReal>& f, Index place) {
-  if constexpr (std::is_same_v<Real, StateReal>) {
-    return to<double>(f.points.get(place).u);
-  } else {
-    return to<double>(column3(f.displacement, f.places, place));
-  }
-}
 
 /// Copies the places of phyxels of the layer [m]. One thread per phyxel.
 template <class Real, class StateReal>
@@ -117,6 +109,49 @@ static __global__ void find_row_forces(ContactPasses passes, int rows) {
   const ThreadGroup threads;
   if (threads.number() < rows) passes.find_force(threads, threads.number());
 }
+static __global__ void find_row_pushes(PenaltyPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_push(threads, threads.number());
+}
+static __global__ void find_row_rubs(PenaltyPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_rub(threads, threads.number());
+}
+
+/// Changes the velocities of points by penalties as a step starts. One group of threads per point.
+/// @param regain 1 over what damping keeps of a velocity, shape [count]
+template <class Real, class StateReal>
+__global__ void push_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
+                           const double* regain) {
+  const ThreadGroup threads;
+  const int p = threads.number();
+  if (p >= s.count) return;
+  const Vec3<double> push = passes.forces_on(threads, p).normal;
+  if (!threads.is_first()) return;
+  s.forces[p].normal += push;
+  const Vec3<double> change = regain[p] * passes.change_by({push, {}}, p);
+  if (change == Vec3<double>{}) return;
+  const Index at = s.place[p];
+  set_column3(f.velocity, f.places, at,
+              to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change));
+}
+
+/// Moves points by friction at the end of a step. One group of threads per point.
+template <class Real, class StateReal>
+__global__ void rub_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
+  const ThreadGroup threads;
+  const int p = threads.number();
+  if (p >= s.count) return;
+  const Vec3<double> friction = passes.forces_on(threads, p).tangential;
+  if (!threads.is_first()) return;
+  s.forces[p].tangential += friction;
+  const Vec3<double> change = passes.change_by({{}, friction}, p);
+  if (change == Vec3<double>{}) return;
+  const Index at = s.place[p];
+  move_to(f, at, displacement_at(f, at) + passes.dt * change,
+          to<double>(column3(f.velocity, f.places, at)) + change);
+  s.velocity[p] = to<double>(column3(f.velocity, f.places, at));
+}
 
 /// Moves points by the forces on them. One group of threads per point.
 template <class Real, class StateReal>
@@ -163,7 +198,10 @@ template <class Real, class StateReal>
 class DeviceBodyContacts {
  public:
   explicit DeviceBodyContacts(DeviceModel<Real, StateReal>& model)
-      : m_(model), points_(model.model()) {
+      : m_(model),
+        points_(model.model()),
+        pushes_(has_body_penalties(model.model())),
+        rubs_(pushes_ && has_body_friction(model.model().body_contact)) {
     if (!acts()) return;
     const BodyContact& contact = m_.model().body_contact;
     std::vector<PlacedDistances> fields;
@@ -201,25 +239,25 @@ class DeviceBodyContacts {
                          static_cast<Index>(tiles_.size()));
     m_.launch_each("begin_motion", begin_motion<Real, StateReal>, count(), m_.fields(), places());
   }
-  /// Moves phyxels that the step has led into bodies out of them. Of a share: collective.
+  /// Changes the velocities with which the step starts by penalties. Of a share: collective.
+  void push_apart() {
+    if (!pushes_ || !points_.any()) return;
+    const PenaltyPasses passes = penalties();
+    const int rows = static_cast<int>(rows_.size());
+    m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
+    if (m_.share()) refresh(motion_);
+    launch_groups("find_touches", find_touches, rows, passes, rows);
+    launch_groups("find_row_pushes", find_row_pushes, rows, passes, rows);
+    launch_groups("push_apart", cuda::push_apart<Real, StateReal>, count(), m_.fields(), passes,
+                  places(), regain_.data());
+  }
+  /// Moves phyxels that the step has led into bodies out of them, or lets those rub that penalties
+  /// push. Of a share: collective.
   void keep_apart() {
     if (!acts() || !points_.any()) return;
-    const ContactPasses passes = this->passes();
-    const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
     m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
-    if (m_.share()) {
-      refresh(motion_);
-      refresh(velocity_);
-    }
-    launch_groups("find_touches", find_touches, rows, passes, rows);
-    launch_groups("find_shares", find_shares, points, passes, points);
-    launch_groups("find_responses", find_responses, rows, passes, rows);
-    for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
-      if (sweep > 0 && m_.share()) refresh(velocity_);
-      launch_groups("find_row_forces", find_row_forces, rows, passes, rows);
-      launch_groups("move_apart", move_apart<Real, StateReal>, count(), m_.fields(), passes,
-                    places());
-    }
+    if (!pushes_) move_apart();
+    if (rubs_) rub_apart();
     m_.launch_each("add_contact_terms", add_contact_terms<Real>, count(), places(), dt_,
                    sums_.pointer());
   }
@@ -235,7 +273,7 @@ class DeviceBodyContacts {
                         layer_found_.bytes() + sums_.bytes() + site_.bytes() + motion_.bytes() +
                         velocity_.bytes() + response_.bytes() + rows_.bytes() + near_.bytes() +
                         carries_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
-                        forces_.bytes() + gradients_.bytes();
+                        forces_.bytes() + gradients_.bytes() + regain_.bytes() + modulus_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -249,6 +287,39 @@ class DeviceBodyContacts {
     std::vector<Index> places;
     for (const Index i : phyxels) places.push_back(m_.tiling().place[i]);
     return places;
+  }
+
+  /// Moves phyxels out of the bodies that the step has led them into.
+  void move_apart() {
+    const ContactPasses passes = this->passes();
+    const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
+    if (m_.share()) {
+      refresh(motion_);
+      refresh(velocity_);
+    }
+    launch_groups("find_touches", find_touches, rows, passes, rows);
+    launch_groups("find_shares", find_shares, points, passes, points);
+    launch_groups("find_responses", find_responses, rows, passes, rows);
+    for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
+      if (sweep > 0 && m_.share()) refresh(velocity_);
+      launch_groups("find_row_forces", find_row_forces, rows, passes, rows);
+      launch_groups("move_apart", cuda::move_apart<Real, StateReal>, count(), m_.fields(), passes,
+                    places());
+    }
+  }
+  /// Adds friction to penalties.
+  void rub_apart() {
+    const PenaltyPasses passes = penalties();
+    const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
+    if (m_.share()) refresh(velocity_);
+    launch_groups("find_shares", find_shares, points, passes, points);
+    launch_groups("find_responses", find_responses, rows, passes, rows);
+    launch_groups("find_row_rubs", find_row_rubs, rows, passes, rows);
+    launch_groups("rub_apart", cuda::rub_apart<Real, StateReal>, count(), m_.fields(), passes,
+                  places());
+  }
+  PenaltyPasses penalties() const {
+    return {passes(), modulus_.data(), share_of_layer * m_.model().body_contact.penalty};
   }
 
   /// Finds the points that may touch anew if phyxels have moved far enough.
@@ -271,6 +342,7 @@ class DeviceBodyContacts {
     m_.wait();
     points_.find(fetched(layer_found_), dt);
     send_points();
+    if (pushes_) send_penalties(dt);
   }
   void send_points() {
     const Model& model = m_.model();
@@ -318,6 +390,16 @@ class DeviceBodyContacts {
     carries_ = {points_.row_of_entry().size(), name};
     share_ = {points_.sites().size(), name};
     forces_ = {places.size(), name};
+  }
+  void send_penalties(double dt) {
+    const Model& model = m_.model();
+    std::vector<double> regain;
+    for (const Index k : points_.own()) {
+      const Part& part = part_of(model, model.body_contact.layer.phyxels[k]);
+      regain.push_back(1 / damped_flow(part.material.damping, dt).keep);
+    }
+    regain_ = sent(regain, name);
+    modulus_ = sent(points_.wave_moduli(), name);
   }
   template <class T>
   DeviceArray<T> sent_span(std::span<const T> values) const {
@@ -380,6 +462,8 @@ class DeviceBodyContacts {
 
   DeviceModel<Real, StateReal>& m_;
   TouchingPoints points_;
+  bool pushes_;  // true if bodies act by penalties
+  bool rubs_;    // true if some of these have friction
   ContactWatch watch_{4};
   double dt_ = 0;  // [s]
   DeviceSums sums_;
@@ -393,6 +477,7 @@ class DeviceBodyContacts {
   DeviceArray<Vec3<double>> position_, centre_;
   DeviceArray<Real> gradients_;
   DeviceArray<PointForces> forces_;
+  DeviceArray<double> regain_, modulus_;  // of penalties; empty without them
   // As of `ContactPasses`.
   DeviceArray<SurfaceSite> site_;
   DeviceArray<SurfaceMotion> motion_;

@@ -24,11 +24,40 @@ struct LayerArrays {
   int count = 0;
 };
 
+/// The displacement of a place, as precisely as the state has it [m].
+template <class Real, class StateReal>
+__device__ Vec3<double> displacement_at(const Fields<Real, StateReal>& f, Index place) {
+  if constexpr (std::is_same_v<Real, StateReal>) {
+    return to<double>(f.points.get(place).u);
+  } else {
+    return to<double>(column3(f.displacement, f.places, place));
+  }
+}
+
+/// Sets the displacement and the velocity of a place.
+template <class Real, class StateReal>
+__device__ void move_to(const Fields<Real, StateReal>& f, Index at, Vec3<double> displacement,
+                        Vec3<double> velocity) {
+  const Vec3<StateReal> u = to<StateReal>(displacement);
+  set_column3(f.velocity, f.places, at, to<StateReal>(velocity));
+  if constexpr (!std::is_same_v<Real, StateReal>) set_column3(f.displacement, f.places, at, u);
+  auto record = f.points.get(at);
+  record.u = to<Real>(u);
+  f.points.set(at, record);
+}
+
 /// Keeps the velocities at the start of a step. One thread per phyxel of the layer.
 template <class Real, class StateReal>
 __global__ void keep_velocities(Fields<Real, StateReal> f, LayerArrays<StateReal> layer) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (k < layer.count) layer.before[k] = column3(f.velocity, f.places, layer.place[k]);
+}
+
+/// Returns 1 for the free axes of a phyxel of the layer and 0 for prescribed ones.
+template <class StateReal>
+__device__ Vec3<double> free_axes_of(const LayerArrays<StateReal>& layer, int k) {
+  const auto free = [&](int axis) { return layer.prescribed[k] >> axis & 1 ? 0.0 : 1.0; };
+  return {free(0), free(1), free(2)};
 }
 
 /// Moves a phyxel of the layer out of an obstacle if the step has led it into it.
@@ -78,6 +107,59 @@ __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
   for (int s = 0; s < ContactTerms::count; ++s) sums.add_of_warp(s, k, terms.value[s]);
 }
 
+/// What penalties need of the phyxels that touch obstacles, in device memory, shape [count] each.
+struct PenaltyArrays {
+  const double* stiffness = nullptr;  ///< Of penalties of 1 [N/m].
+  const double* inertia = nullptr;    ///< As of `PushedPoint` [kg/s].
+};
+
+/// Changes the velocities with which a step starts by the penalty of an obstacle, and adds to the
+/// obstacle's sums. One thread per phyxel of the layer. @param obstacle as the step starts
+template <class Shape, class Real, class StateReal>
+__global__ void push_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer,
+                         PenaltyArrays penalties, Shape shape, ObstacleStep obstacle,
+                         double penalty, SumWords sums) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  ContactTerms terms;
+  if (k < layer.count) {
+    const Index at = layer.place[k];
+    const PushedPoint point{layer.position[k] + displacement_at(f, at), free_axes_of(layer, k),
+                            layer.offset[k], penalty * penalties.stiffness[k],
+                            penalties.inertia[k]};
+    const Vec3<double> change = penalty_change(shape, obstacle, point, terms);
+    if (!(change == Vec3<double>{})) {
+      set_column3(f.velocity, f.places, at,
+                  to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change));
+    }
+  }
+  for (int s = 0; s < ContactTerms::count; ++s) sums.add_of_warp(s, k, terms.value[s]);
+}
+
+/// Lets phyxels rub on an obstacle whose penalty pushes them, at the end of a step, and adds to the
+/// obstacle's sums. One thread per phyxel of the layer.
+template <class Shape, class Real, class StateReal>
+__global__ void rub_on(Fields<Real, StateReal> f, LayerArrays<StateReal> layer,
+                       PenaltyArrays penalties, Shape shape, ObstacleStep obstacle, double penalty,
+                       SumWords sums) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  ContactTerms terms;
+  if (k < layer.count) {
+    const Index at = layer.place[k];
+    const Vec3<double> u = displacement_at(f, at),
+                       v = to<double>(column3(f.velocity, f.places, at));
+    TouchingPoint point{layer.position[k] + u,
+                        v,
+                        to<double>(layer.before[k]),
+                        free_axes_of(layer, k),
+                        layer.offset[k],
+                        layer.inertia[k]};
+    if (rub(shape, obstacle, penalty * penalties.stiffness[k], point, terms)) {
+      move_to(f, at, u + obstacle.dt * (point.velocity - v), point.velocity);
+    }
+  }
+  for (int s = 0; s < ContactTerms::count; ++s) sums.add_of_warp(s, k, terms.value[s]);
+}
+
 /// The shape of an obstacle, with what it reads in device memory.
 class DeviceForm {
  public:
@@ -116,7 +198,12 @@ class Contacts {
     prescribed_ = sent(prescribed, name);
     offset_ = sent(layer.offset, name);
     before_ = sent(std::vector<Vec3<StateReal>>(places.size()), name);
-    for (const Obstacle& obstacle : m_.model().obstacles) {
+    const std::vector<Obstacle>& obstacles = m_.model().obstacles;
+    if (std::any_of(obstacles.begin(), obstacles.end(),
+                    [](const Obstacle& o) { return o.penalty > 0; })) {
+      stiffness_ = sent(stiffness_of_layer(m_.model(), share_of_layer), name);
+    }
+    for (const Obstacle& obstacle : obstacles) {
       sums_.emplace_back(ContactTerms::count, accumulators, name);
       fields_.emplace_back(obstacle, name);
     }
@@ -127,8 +214,7 @@ class Contacts {
   /// True if an obstacle moves, so that launches change from step to step.
   bool changes() const {
     const std::vector<Obstacle>& all = m_.model().obstacles;
-    return std::any_of(all.begin(), all.end(),
-                       [](const Obstacle& o) { return !o.stands_still(); });
+    return std::any_of(all.begin(), all.end(), [](const Obstacle& o) { return !o.stands_still(); });
   }
   /// Prepares for `count` steps of `dt` [s], some tens at most. Call before they are launched or
   /// recorded.
@@ -137,6 +223,7 @@ class Contacts {
     if (dt != dt_) {
       m_.wait();  // steps in progress read the inertias
       inertia_ = sent(inertia_of_layer(m_.model(), dt), "contact");
+      if (pushes()) start_inertia_ = sent(start_inertia_of_layer(m_.model(), dt), "contact");
       dt_ = dt;
     }
     for (DeviceSums& sums : sums_) {
@@ -150,8 +237,27 @@ class Contacts {
     m_.launch_each("keep_velocities", keep_velocities<Real, StateReal>, layer.count, m_.fields(),
                    layer);
   }
+  /// True if an obstacle acts by penalties.
+  bool pushes() const { return stiffness_.size() > 0; }
+  /// Changes the velocities with which the step from `time` [s] starts by penalties.
+  void push_phyxels(double time) {
+    if (!pushes()) return;
+    const LayerArrays<StateReal> layer = arrays();
+    for (std::size_t o = 0; o < sums_.size(); ++o) {
+      const Obstacle& obstacle = m_.model().obstacles[o];
+      if (!(obstacle.penalty > 0)) continue;
+      const ObstacleStep start = obstacle.free ? rigid_.start_of(o) : obstacle.stage_to(time, dt_);
+      const SumWords words = sums_[o].pointer();
+      ObstacleShapes::with(fields_[o].form(), [&](const auto& shape) {
+        m_.launch_each("push_out", push_out<std::decay_t<decltype(shape)>, Real, StateReal>,
+                       layer.count, m_.fields(), layer, penalties(), shape, start, obstacle.penalty,
+                       words);
+      });
+    }
+    if (!rigid_.empty()) rigid_.act_back(sums());
+  }
   /// Moves phyxels out of the obstacles, one obstacle after the other, after a step from `time`
-  /// [s].
+  /// [s], and lets those rub that penalties push.
   void keep_phyxels_out(double time) {
     const LayerArrays<StateReal> layer = arrays();
     rigid_.begin_step(time, dt_);
@@ -160,11 +266,18 @@ class Contacts {
       const ObstacleStep step = obstacle.free ? rigid_.step_of(o) : obstacle.step_from(time, dt_);
       const SumWords words = sums_[o].pointer();
       ObstacleShapes::with(fields_[o].form(), [&](const auto& shape) {
-        m_.launch_each("keep_out", keep_out<std::decay_t<decltype(shape)>, Real, StateReal>,
-                       layer.count, m_.fields(), layer, shape, step, words, o + 1 == sums_.size());
+        using Shape = std::decay_t<decltype(shape)>;
+        if (obstacle.penalty > 0) {
+          if (!(obstacle.law.static_friction > 0)) return;
+          m_.launch_each("rub_on", rub_on<Shape, Real, StateReal>, layer.count, m_.fields(), layer,
+                         penalties(), shape, step, obstacle.penalty, words);
+          return;
+        }
+        m_.launch_each("keep_out", keep_out<Shape, Real, StateReal>, layer.count, m_.fields(),
+                       layer, shape, step, words, o + 1 == sums_.size());
       });
     }
-    if (!rigid_.empty()) rigid_.end_step(sums());
+    if (!rigid_.empty()) rigid_.act_back(sums());
   }
   /// Sets the states of free bodies, as of `RigidBodies::put`.
   void put_rigid(std::span<const RigidState> states, double dt) { rigid_.put(states, dt); }
@@ -181,7 +294,8 @@ class Contacts {
   }
   std::size_t bytes() const {
     std::size_t bytes = place_.bytes() + position_.bytes() + prescribed_.bytes() + offset_.bytes() +
-                        before_.bytes() + inertia_.bytes();
+                        before_.bytes() + inertia_.bytes() + stiffness_.bytes() +
+                        start_inertia_.bytes();
     for (const DeviceSums& sums : sums_) bytes += sums.bytes();
     for (const DeviceForm& form : fields_) bytes += form.bytes();
     return bytes;
@@ -189,6 +303,8 @@ class Contacts {
 
  private:
   static constexpr unsigned accumulators = 128;
+
+  PenaltyArrays penalties() const { return {stiffness_.data(), start_inertia_.data()}; }
 
   LayerArrays<StateReal> arrays() const {
     return {place_.data(),
@@ -205,6 +321,7 @@ class Contacts {
   DeviceArray<Vec3<double>> position_;
   DeviceArray<char> prescribed_;
   DeviceArray<double> offset_, inertia_;
+  DeviceArray<double> stiffness_, start_inertia_;  // of penalties; empty without them
   DeviceArray<Vec3<StateReal>> before_;
   std::vector<DeviceSums> sums_;
   RigidBodies rigid_;

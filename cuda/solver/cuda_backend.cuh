@@ -344,8 +344,10 @@ class CudaBackend final : public Backend {
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
     if (fresh_ || boundary_.changes() || contacts_.acts() || body_contacts_.acts()) {
-      if (!follows) contacts_.remember_velocities();
+      if (!follows || contacts_.pushes()) contacts_.remember_velocities();
       body_contacts_.begin_step(m_.dt(), *passes_);
+      body_contacts_.push_apart();
+      contacts_.push_phyxels(time);
       passes_->advance(m_.dt());
       boundary_.follow_paths(time, m_.dt());
       if (fresh_) boundary_.put_held_at_rest();

@@ -36,7 +36,8 @@ BodyContact laws_of(const Scene& scene) {
                               request.restitution},
                       .all = touches_all(request),
                       .self = request.self,
-                      .sweeps = request.sweeps};
+                      .sweeps = request.sweeps,
+                      .penalty = request.method == ContactMethod::penalty ? request.stiffness : 0};
   for (const ContactPairRequest& pair : request.pairs) {
     const Index a = body_named(scene, pair.first), b = body_named(scene, pair.second);
     const double friction = pair.friction.value_or(request.friction);

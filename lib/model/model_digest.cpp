@@ -128,6 +128,7 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
                             obstacle.form.lengths[1], obstacle.form.lengths[2],
                             obstacle.hollow ? 1.0 : 0.0, obstacle.law.static_friction,
                             obstacle.law.kinetic_friction, obstacle.law.restitution});
+    if (obstacle.penalty > 0) add(state.get(), std::vector<double>{obstacle.penalty});
     if (obstacle.surface) {
       add(state.get(), obstacle.surface->position);
       add(state.get(), obstacle.surface->triangle);

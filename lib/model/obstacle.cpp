@@ -82,14 +82,22 @@ void set_free(Obstacle& made, const ObstacleRequest& request) {
                    {volume * m.x * m.y - s.xy, xx + zz, volume * m.y * m.z - s.yz},
                    {volume * m.x * m.z - s.xz, volume * m.y * m.z - s.yz, xx + yy}}};
   const Mat3d i = density * (made.turn * own * transpose(made.turn));
-  made.free = RigidMass{density * volume, made.place + made.turn * m,
+  made.free = RigidMass{density * volume,
+                        made.place + made.turn * m,
                         {i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2), i(2, 2)}};
   made.start.place = made.free->centre;
   made.start.velocity = request.velocity;
   made.start.angular_momentum = made.free->inertia * request.spin;
 }
 
-Obstacle obstacle_of(const ObstacleRequest& request) {
+/// The stiffness of penalties of an obstacle, or 0.
+/// @param shared the [contact] of the scene
+double penalty_of(const ObstacleRequest& request, const ContactRequest& shared) {
+  const bool acts = request.method.value_or(shared.method) == ContactMethod::penalty;
+  return acts ? request.stiffness.value_or(shared.stiffness) : 0;
+}
+
+Obstacle obstacle_of(const ObstacleRequest& request, const ContactRequest& shared) {
   Obstacle made{.name = request.name, .hollow = request.hollow, .place = request.translation};
   int index = 0;
   ObstacleShapes::for_each([&]<class Shape>(std::type_identity<Shape>) {
@@ -110,6 +118,7 @@ Obstacle obstacle_of(const ObstacleRequest& request) {
       request.normal ? turn_of_normal(*request.normal) : rotation_by(degree * request.rotation);
   made.law = {request.friction, request.kinetic_friction.value_or(request.friction),
               request.restitution};
+  made.penalty = penalty_of(request, shared);
   made.motion = motion_along(request.motion);
   if (request.density) set_free(made, request);
   return made;
@@ -140,7 +149,10 @@ void set_rigid_motion(ObstacleStep& step, const Path& change, double span, const
 
 std::vector<Obstacle> obstacles_of(const Scene& scene) {
   std::vector<Obstacle> all;
-  for (const ObstacleRequest& request : scene.obstacles) all.push_back(obstacle_of(request));
+  const ContactRequest shared = scene.contact.value_or(ContactRequest{});
+  for (const ObstacleRequest& request : scene.obstacles) {
+    all.push_back(obstacle_of(request, shared));
+  }
   return all;
 }
 

@@ -83,6 +83,11 @@ std::vector<SceneKey> obstacle_keys() {
       {.section = "obstacle", .name = "restitution", .fallback = "0", .range = between(0, 1),
        .meaning = "Speed of a point of a surface after an impact over that before. What a body as a whole gives back "
            "comes from its elasticity: 0 is right for most, and 1 returns no more than 0, as what is behind the layer hits it again."},
+      {.section = "obstacle", .name = "method", .type = KeyType::choice, .otherwise = "that of [contact], or \"projected\"",
+       .words = {"projected", "penalty"}, .meaning = "How phyxels are kept out in Verlet's steps, as in [contact]. The key is of this obstacle alone, "
+           "and needs no [contact]."},
+      {.section = "obstacle", .name = "stiffness", .otherwise = "that of [contact], or 0.1", .range = between(1e-6, 1e6),
+       .meaning = "Of penalties, as in [contact]."},
       {.section = "obstacle", .name = "motion", .type = KeyType::table, .otherwise = "at rest",
        .meaning = "How the obstacle moves."},
       {.section = "obstacle", .name = "density", .unit = "kg/m^3", .otherwise = "none",
@@ -108,6 +113,14 @@ std::vector<SceneKey> contact_keys() {
        .meaning = "Whether parts of one body touch each other, too: those that are two supports and more apart at rest."},
       {.section = "contact", .name = "sweeps", .type = KeyType::integer, .fallback = "4", .range = between(1, 1000),
        .meaning = "How often contact is resolved in each step. With 1, a step costs less, and what friction holds creeps; high stacks need more."},
+      {.section = "contact", .name = "method", .type = KeyType::choice, .fallback = "\"projected\"",
+       .words = {"projected", "penalty"}, .meaning = "How Verlet's steps keep bodies apart, and phyxels out of obstacles that have no `method` of their own. \"projected\": "
+           "points are moved out of what a step has led them into; nothing has to be tuned, the layers that meet lose the energy of their impact. "
+           "\"penalty\": springs push them back, so that what contact stores is given back, and total energy closes to second order in the step; "
+           "bodies sink into each other a little, and steps are shorter. The methods \"implicit\" and \"equilibrium\" of [solver] always use penalties, of a stiffness of their own."},
+      {.section = "contact", .name = "stiffness", .fallback = "0.1", .range = between(1e-6, 1e6),
+       .meaning = "Of penalties: about that of the springs over that of a layer of phyxels. At a pressure p bodies sink into each other by about p/(`stiffness` E) "
+           "distances between phyxels; a quarter of a support is allowed. Large values shorten the steps."},
       {.section = "contact", .name = "all", .type = KeyType::boolean, .otherwise = "true without pairs",
        .meaning = "Whether all bodies touch each other, not only those of `pair`."},
       {.section = "contact", .name = "pair", .type = KeyType::tables, .otherwise = "none",

@@ -183,6 +183,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   scene.bodies = naming(scene, [&] { return read_bodies(root); });
   scene.obstacles = read_obstacles(root, FilesOf::run);
   if (root.has("contact")) scene.contact = read_contact(root.table("contact"), scene.bodies);
+  check_penalties(scene);
   naming(scene, [&] { read_probes(root, scene.bodies); });
   return scene;
 }

@@ -41,6 +41,14 @@ void check_name(const ContactPairRequest& pair, const char* key, const std::stri
                      fmt::join(names, ", "), bodies.size() > most ? ", ..." : ""));
 }
 
+/// The problem of a restitution above 0 beside penalties.
+std::string refused_restitution(double restitution) {
+  return fmt::format(
+      "{:g} found with method = \"penalty\", whose springs give back all that they take; allowed: "
+      "0, or method = \"projected\"",
+      restitution);
+}
+
 }  // namespace
 
 ContactRequest read_contact(const SceneTable& table, const std::vector<BodyRequest>& bodies) {
@@ -50,6 +58,8 @@ ContactRequest read_contact(const SceneTable& table, const std::vector<BodyReque
   table.read("restitution", contact.restitution);
   table.read("self", contact.self);
   table.read("sweeps", contact.sweeps);
+  table.read_choice("method", contact.method);
+  table.read("stiffness", contact.stiffness);
   table.read("all", contact.all);
   if (table.has("pair")) {
     for (const SceneTable& of_pair : table.tables("pair")) {
@@ -67,6 +77,10 @@ ContactRequest read_contact(const SceneTable& table, const std::vector<BodyReque
 }
 
 void check_contact(const ContactRequest& contact, const std::vector<BodyRequest>& bodies) {
+  const bool is_penalty = contact.method == ContactMethod::penalty;
+  if (is_penalty && contact.restitution > 0) {
+    refuse(contact.where, "contact.restitution", refused_restitution(contact.restitution));
+  }
   check_friction(contact.where, "contact.kinetic_friction", contact.friction,
                  contact.kinetic_friction);
   if (contact.all == false && contact.pairs.empty() && !contact.self) {
@@ -88,6 +102,9 @@ void check_contact(const ContactRequest& contact, const std::vector<BodyRequest>
     }
     check_friction(pair.where, "contact.pair.kinetic_friction",
                    pair.friction.value_or(contact.friction), pair.kinetic_friction);
+    if (is_penalty && pair.restitution.value_or(0) > 0) {
+      refuse(pair.where, "contact.pair.restitution", refused_restitution(*pair.restitution));
+    }
     const auto [earlier, is_new] = places.emplace(std::minmax(pair.first, pair.second), pair.where);
     if (!is_new) {
       refuse(pair.where, "contact.pair",
@@ -95,6 +112,17 @@ void check_contact(const ContactRequest& contact, const std::vector<BodyRequest>
                          in_quotes(pair.first), in_quotes(pair.second),
                          earlier->second.empty() ? "" : " at ", earlier->second));
     }
+  }
+}
+
+void check_penalties(const Scene& scene) {
+  const ContactMethod shared = scene.contact ? scene.contact->method : ContactMethod::projected;
+  for (const ObstacleRequest& obstacle : scene.obstacles) {
+    const bool is_penalty = obstacle.method.value_or(shared) == ContactMethod::penalty;
+    if (!is_penalty || !(obstacle.restitution > 0)) continue;
+    refuse(obstacle.where, "obstacle.restitution",
+           fmt::format("of obstacle \"{}\": {}", obstacle.name,
+                       refused_restitution(obstacle.restitution)));
   }
 }
 

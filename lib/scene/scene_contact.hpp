@@ -14,4 +14,8 @@ ContactRequest read_contact(const SceneTable& table, const std::vector<BodyReque
 /// @throws InputError naming the key, its value and what is allowed
 void check_contact(const ContactRequest& contact, const std::vector<BodyRequest>& bodies);
 
+/// Checks that obstacles that act by penalties have no restitution.
+/// @throws InputError naming the obstacle and what is allowed
+void check_penalties(const Scene& scene);
+
 }  // namespace phyxel

@@ -78,6 +78,8 @@ ObstacleRequest read_obstacle(const SceneTable& table, std::size_t number, Files
   table.read("friction", obstacle.friction);
   table.read("kinetic_friction", obstacle.kinetic_friction);
   table.read("restitution", obstacle.restitution);
+  if (table.has("method")) table.read_choice("method", obstacle.method.emplace());
+  table.read("stiffness", obstacle.stiffness);
   if (table.has("motion")) read_path(table.table("motion"), obstacle.motion);
   table.read("density", obstacle.density);
   for (const char* key : {"velocity", "spin"}) {

@@ -142,6 +142,11 @@ void visit_obstacle(const ObstacleRequest& obstacle, Visit&& visit) {
     visit("obstacle", "kinetic_friction", *obstacle.kinetic_friction);
   }
   visit("obstacle", "restitution", obstacle.restitution);
+  if (obstacle.method) {
+    visit("obstacle", "method",
+          std::string(*obstacle.method == ContactMethod::penalty ? "penalty" : "projected"));
+  }
+  if (obstacle.stiffness) visit("obstacle", "stiffness", *obstacle.stiffness);
   visit_path("obstacle.motion", obstacle.motion, visit);
   if (obstacle.density) {
     visit("obstacle", "density", *obstacle.density);
@@ -266,6 +271,13 @@ void visit_contact(const ContactRequest& contact, Visit&& visit) {
   visit("contact", "restitution", contact.restitution);
   visit("contact", "self", contact.self);
   visit("contact", "sweeps", contact.sweeps);
+  // Checkpoints of before have no such keys.
+  if (contact.method == ContactMethod::penalty) {
+    visit("contact", "method", std::string("penalty"));
+  }
+  if (contact.stiffness != default_contact_stiffness) {
+    visit("contact", "stiffness", contact.stiffness);
+  }
   if (contact.all) visit("contact", "all", *contact.all);
 }
 

@@ -120,6 +120,7 @@ void validate(const Scene& scene) {
   });
   for (const ObstacleRequest& obstacle : scene.obstacles) check_obstacle(obstacle);
   if (scene.contact) check_contact(*scene.contact, scene.bodies);
+  check_penalties(scene);
   for (const BodyRequest& body : scene.bodies) {
     check_law(body, body.material, body.where);
     for (const InclusionRequest& inclusion : body.inclusions) {

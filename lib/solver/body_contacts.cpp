@@ -7,11 +7,18 @@
 
 #include "mesh/distance_field.hpp"
 #include "model/parts.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
 BodyContacts::BodyContacts(const Model& model, int threads)
-    : model_(model), threads_(threads), points_(model), watch_(model, threads) {
+    : model_(model),
+      threads_(threads),
+      points_(model),
+      watch_(model, threads),
+      pushes_(has_body_penalties(model)) {
   if (!acts()) return;
+  rubs_ = pushes_ && has_body_friction(model.body_contact);
   sums_.resize(ContactTerms::count * model.body_contact.distances.size());
   for (const BodyDistances& distances : model.body_contact.distances) {
     fields_.push_back(distances ? distances.view() : PlacedDistances{});
@@ -34,6 +41,13 @@ void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
   forces_.assign(count(), {});
   totals_.assign(count(), {});
   active_.clear();
+  own_active_.clear();
+  if (!pushes_) return;
+  modulus_ = points_.wave_moduli();
+  regain_.clear();
+  for (std::size_t p = 0; p < count(); ++p) {
+    regain_.push_back(1 / damped_flow(part_of(model_, phyxel(p)).material.damping, dt).keep);
+  }
 }
 
 void BodyContacts::set_gradient(std::size_t p, const Mat3d& gradient) {
@@ -114,16 +128,39 @@ void BodyContacts::find_responses() {
   }
 }
 
-void BodyContacts::find_forces() {
-  const ContactPasses passes = this->passes();
+template <class Passes, class Find>
+void BodyContacts::find_forces_by(const Passes& passes, Find&& find) {
 #pragma omp parallel num_threads(threads_here())
   {
 #pragma omp for schedule(static)
-    for (std::size_t k = 0; k < inside_.size(); ++k) passes.find_force(OneThread{}, inside_[k]);
+    for (std::size_t k = 0; k < inside_.size(); ++k) find(passes, inside_[k]);
 #pragma omp for schedule(static)
     for (std::size_t k = 0; k < own_active_.size(); ++k) {
       forces_[own_active_[k]] = passes.forces_on(OneThread{}, own_active_[k]);
     }
+  }
+}
+
+void BodyContacts::find_forces() {
+  find_forces_by(passes(), [](const auto& of, Index r) { of.find_force(OneThread{}, r); });
+}
+
+void BodyContacts::find_pushes() {
+  find_forces_by(penalties(), [](const auto& of, Index r) { of.find_push(OneThread{}, r); });
+}
+
+void BodyContacts::find_rubs() {
+  find_forces_by(penalties(), [](const auto& of, Index r) { of.find_rub(OneThread{}, r); });
+}
+
+PenaltyPasses BodyContacts::penalties() {
+  return {passes(), modulus_.data(), share_of_layer * model_.body_contact.penalty};
+}
+
+void BodyContacts::add_push_energy(ExactSum& sum) {
+  const PenaltyPasses passes = penalties();
+  for (const Index r : inside_) {
+    if (points_.rows()[r].point < static_cast<Index>(count())) sum.add(passes.energy(r));
   }
 }
 
@@ -150,7 +187,8 @@ std::size_t BodyContacts::bytes() const {
   return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) + watch_.bytes() +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(Vec3d) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
-         carries_.size() * sizeof(SurfaceShare) + 2 * forces_.size() * sizeof(PointForces);
+         carries_.size() * sizeof(SurfaceShare) + 2 * forces_.size() * sizeof(PointForces) +
+         (modulus_.size() + regain_.size()) * sizeof(double);
 }
 
 }  // namespace phyxel

@@ -43,6 +43,8 @@ class TouchingPoints {
   const Csr& rows_from() const { return rows_from_; }
   /// True if there are rows on any rank.
   bool any() const { return any_; }
+  /// The modulus of pressure waves of each point [Pa]. Of a share: collective.
+  std::vector<double> wave_moduli() const;
   /// Gives the points of other ranks the values that their owners have: motions, or vectors. Of a
   /// share: collective. @param of_points shape [points]
   template <class T>
@@ -108,11 +110,42 @@ class BodyContacts {
   /// A number that changes when these phyxels do.
   std::int64_t generation() const { return watch_.generation(); }
 
-  /// Moves phyxels that the step has led into bodies out of them. Of a share: collective.
+  /// Changes the velocities with which the step starts by penalties, whose forces it finds, where
+  /// points are `before` and gradients are set. Of a share: collective.
+  /// @param get,set return and replace the state of a phyxel
+  template <class Get, class Set>
+  void push_apart(Get&& get, Set&& set) {
+    if (!pushes_ || !points_.any()) return;
+    forget_totals();
+    for (std::size_t p = 0; p < count(); ++p) motion_[p].after = motion_[p].before;
+    points_.refresh(motion_);
+    find_touches();
+    find_active();
+    find_pushes();
+    for (const Index p : own_active_) {
+      totals_[p].normal += forces_[p].normal;
+      const Vec3d change = regain_[p] * passes().change_by({forces_[p].normal, {}}, p);
+      if (change == Vec3d{}) continue;
+      const SurfaceState state = get(phyxel(p));
+      set(phyxel(p), {state.displacement, state.velocity + change});
+    }
+  }
+  /// Calls each(i, force) with the forces [N] that `push_apart` has found on phyxels of this rank.
+  template <class Each>
+  void for_each_push(Each&& each) const {
+    for (const Index p : own_active_) each(phyxel(p), forces_[p].normal);
+  }
+  /// Adds the energies of this rank's points by these forces [J].
+  void add_push_energy(ExactSum& sum);
+
+  /// Moves phyxels that the step has led into bodies out of them, or lets them rub on bodies by
+  /// which `push_apart` has pushed them. Of a share: collective.
   /// @param get,set return and replace the state of a phyxel at the end of the step
   template <class Get, class Set>
   void keep_apart(Get&& get, Set&& set) {
     if (!acts() || !points_.any()) return;
+    if (pushes_) return rub(get, set);
+    forget_totals();
     place(get);
     find_touches();
     find_active();
@@ -134,9 +167,14 @@ class BodyContacts {
       }
     }
     for (const Index p : own_active_) {
-      const PointForces total = std::exchange(totals_[p], {});
-      if (total.normal != Vec3d{}) add_to_sums(p, total);
+      if (totals_[p].normal != Vec3d{}) add_to_sums(p, totals_[p]);
     }
+  }
+  /// Calls each(i, force) with the force [N] of other bodies in the last step on phyxels of this
+  /// rank, held ones, too.
+  template <class Each>
+  void for_each_force(Each&& each) const {
+    for (const Index p : own_active_) each(phyxel(p), totals_[p].sum());
   }
   /// The depth of the deepest phyxel of each body in other bodies [m]. Of a share: that of this
   /// rank's phyxels; collective. @param get returns the state of a phyxel
@@ -167,15 +205,46 @@ class BodyContacts {
     points_.refresh(motion_);
     points_.refresh(velocity_);
   }
+  void forget_totals() {
+    for (const Index p : own_active_) totals_[p] = {};
+  }
+  /// Ends a step of penalties: adds friction, and all to the sums.
+  template <class Get, class Set>
+  void rub(Get&& get, Set&& set) {
+    for (std::size_t p = 0; p < count(); ++p) velocity_[p] = get(phyxel(p)).velocity;
+    if (rubs_) {
+      points_.refresh(velocity_);
+      find_responses();
+      find_rubs();
+      for (const Index p : own_active_) {
+        const Vec3d friction = forces_[p].tangential;
+        totals_[p].tangential += friction;
+        const Vec3d change = passes().change_by({{}, friction}, p);
+        if (change == Vec3d{}) continue;
+        const SurfaceState state = get(phyxel(p));
+        set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
+        velocity_[p] = get(phyxel(p)).velocity;
+      }
+    }
+    for (const Index p : own_active_) {
+      if (totals_[p].normal != Vec3d{}) add_to_sums(p, totals_[p]);
+    }
+  }
   void find_touches();
   /// Finds the rows whose points are inside other bodies, and all points of these rows: no other
   /// point has a force.
   void find_active();
   void find_responses();
   void find_forces();
+  void find_pushes();
+  void find_rubs();
+  /// Runs find(passes, r) for the rows whose points are inside, and finds the forces on points.
+  template <class Passes, class Find>
+  void find_forces_by(const Passes& passes, Find&& find);
   void add_depths(std::vector<double>& deepest) const;
   int threads_here() const;
   ContactPasses passes();
+  PenaltyPasses penalties();
   void add_to_sums(std::size_t p, const PointForces& forces);
 
   const Model& model_;
@@ -197,7 +266,11 @@ class BodyContacts {
   std::vector<char> is_active_;             // of each point
   std::vector<Index> active_, own_active_;  // points of these rows, and those of this rank
   LayerWatch watch_;
-  double dt_ = 0;  // [s]
+  double dt_ = 0;                // [s]
+  bool pushes_;                  // true if bodies act by penalties; else all that follows is empty
+  bool rubs_ = false;            // true if some of them have friction
+  std::vector<double> modulus_;  // of pressure waves, shape [points] [Pa]
+  std::vector<double> regain_;   // 1 over what damping keeps of a velocity, of own points
 };
 
 }  // namespace phyxel

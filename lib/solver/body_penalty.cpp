@@ -8,14 +8,13 @@
 #include "phyxel/diagnostics.hpp"
 #include "rank_sums.hpp"
 #include "solver/contact_penalty.hpp"
+#include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
 namespace {
 
 constexpr double reach = 0.25;           // gap of points that may touch before the next `linearise`
 constexpr double rounding_reach = 1e-6;  // gap up to which a point counts as held
-
-double harmonic_mean(double a, double b) { return 2 * a * b / (a + b); }
 
 }  // namespace
 
@@ -38,13 +37,7 @@ void BodyPenalty::find_points(const Vector& u) {
   if (moved <= 0.5 * points_.skin()) return;
   found_at_ = std::move(now);
   points_.find(found_at_, 1);
-  modulus_.assign(points_.sites().size(), {});
-  for (std::size_t p = 0; p < count(); ++p) {
-    const Material& material = part_of(model_, phyxel(p)).material;
-    const double c = pressure_wave_speed(material);
-    modulus_[p] = {material.density * c * c, 0, 0};
-  }
-  points_.refresh(modulus_);
+  modulus_ = points_.wave_moduli();
   knows_points_ = true;
   knows_shapes_ = knows_expected_ = false;
   mixing_.forget();
@@ -113,10 +106,9 @@ void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient)
     const SurfaceSite& site = points_.sites()[point];
     double of_surface = 0;
     for_each_carrier(r, [&](Index p, const SurfaceShare& carries) {
-      of_surface += carries.weight * modulus_[p].x;
+      of_surface += carries.weight * modulus_[p];
     });
-    const double modulus = harmonic_mean(modulus_[point].x, of_surface);
-    stiffness_[r] = share_of_stiffness * modulus * site.area / site.range;
+    stiffness_[r] = surface_stiffness(share_of_stiffness, modulus_[point], of_surface, site);
   }
   gap_.resize(rows);
   for (std::size_t r = 0; r < rows; ++r) gap_[r] = touches_[r].gap;

@@ -98,7 +98,7 @@ class BodyPenalty {
   const Model& model_;
   TouchingPoints points_;
   std::vector<PlacedDistances> fields_;  // of each body of the scene
-  std::vector<Vec3d> modulus_;           // of pressure waves, of each point, as x [Pa]
+  std::vector<double> modulus_;          // of pressure waves, of each point [Pa]
   std::vector<Vec3d> found_at_;          // places of the layer when points were found [m]
   std::vector<Vec3d> shaped_at_;         // places of own points when normals were found [m]
   std::vector<Vec3d> start_;             // displacements of the points at `linearise` [m]

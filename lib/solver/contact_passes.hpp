@@ -3,6 +3,7 @@
 #pragma once
 
 #include "phyxel/physics/body_contact.hpp"
+#include "phyxel/physics/contact_penalty.hpp"
 
 namespace phyxel {
 
@@ -123,7 +124,7 @@ struct ContactPasses {
     return {m.x * f.x, m.y * f.y, m.z * f.z};
   }
 
- private:
+ protected:
   PHYXEL_HD const Offset* entries_of_row(Index r) const {
     return near_start + contact_threads * static_cast<Offset>(r);
   }
@@ -136,6 +137,43 @@ struct ContactPasses {
       if (part != 0) surface += part * velocity[near[e]];
     });
     return velocity[row[r].point] - threads.sum(surface);
+  }
+};
+
+/// The passes of contact by penalties. At the start of a step, where points are both before and
+/// after, `find_touch` and `find_push` for all rows give the normal forces; at its end, with
+/// velocities as all other forces have led to, `find_share`, `find_response` and `find_rub` give
+/// those along surfaces.
+struct PenaltyPasses : ContactPasses {
+  const double* modulus = nullptr;  ///< Of pressure waves, of each point [Pa].
+  double stiffness = 0;             ///< Share of `surface_stiffness`.
+
+  template <class Threads>
+  PHYXEL_HD void find_push(const Threads& threads, Index r) const {
+    SurfaceForce found{};
+    if (touch[r].is_inside) found.push = -stiffness_of(threads, r) * touch[r].gap;
+    if (threads.is_first()) force[r] = found;
+  }
+  template <class Threads>
+  PHYXEL_HD void find_rub(const Threads& threads, Index r) const {
+    if (!touch[r].is_inside) return;
+    SurfaceForce found{.push = force[r].push};
+    add_friction(touch[r], response[r], relative_velocity(threads, r), row[r].law, found);
+    if (threads.is_first()) force[r] = found;
+  }
+  /// The energy of a row whose `find_push` has been run [J].
+  PHYXEL_HD double energy(Index r) const {
+    return touch[r].is_inside ? -0.5 * force[r].push * touch[r].gap : 0;
+  }
+
+ private:
+  template <class Threads>
+  PHYXEL_HD double stiffness_of(const Threads& threads, Index r) const {
+    double of_surface = 0;
+    threads.each(entries_of_row(r),
+                 [&](Offset e) { of_surface += carries[e].weight * modulus[near[e]]; });
+    const Index p = row[r].point;
+    return surface_stiffness(stiffness, modulus[p], threads.sum(of_surface), site[p]);
   }
 };
 

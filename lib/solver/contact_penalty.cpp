@@ -8,6 +8,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
 PlacedObstacles obstacles_after(const Model& model, double share) {
@@ -26,17 +27,21 @@ PlacedObstacles obstacles_over(const Model& model, double time, double span) {
   return placed;
 }
 
+PlacedObstacles obstacles_now(const Model& model, double time, std::span<const RigidState> rigid) {
+  PlacedObstacles placed;
+  std::size_t free = 0;
+  for (const Obstacle& obstacle : model.obstacles) {
+    placed.push_back(obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(time, 0));
+  }
+  return placed;
+}
+
 ContactPenalty::ContactPenalty(const Model& model)
     : model_(model),
       groups_(groups_of(model, model.contact)),
+      stiffness_(stiffness_of_layer(model, share_of_stiffness)),
       blocks_(model.contact.phyxels.size()),
-      bodies_(model) {
-  for (const Index i : model.contact.phyxels) {
-    const double c = pressure_wave_speed(part_of(model, i).material);
-    const double crossings = c / model.neighbourhood.support[i];
-    stiffness_.push_back(share_of_stiffness * model.mass[i] * crossings * crossings);
-  }
-}
+      bodies_(model) {}
 
 template <class Each>
 void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const {

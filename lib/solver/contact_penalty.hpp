@@ -25,6 +25,9 @@ PlacedObstacles obstacles_after(const Model& model, double share);
 /// Returns the obstacles at a time [s], with their velocities over the last `span` [s].
 PlacedObstacles obstacles_over(const Model& model, double time, double span);
 
+/// Returns the obstacles at a time [s], free bodies in their states.
+PlacedObstacles obstacles_now(const Model& model, double time, std::span<const RigidState> rigid);
+
 /// Stiffness of penalties, times that of a phyxel against its neighbours. A layer of phyxels on a
 /// face, s apart, then is as stiff as a fifth of s of the body.
 inline constexpr double share_of_stiffness = 40;

@@ -9,83 +9,15 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
-#include "solver/body_contacts.hpp"
 #include "solver/contact_penalty.hpp"
+#include "solver/contact_stiffness.hpp"
+#include "solver/next_step.hpp"
 #include "solver/present_forces.hpp"
-#include "solver/step_contacts.hpp"
 
 namespace phyxel {
 namespace {
 
 constexpr const char* body_shape = "body";  // where readings of obstacles have a shape
-
-/// The state of some phyxels after a step in which nothing touches them.
-State next_state(const Model& model, const SupportInstant& now, const State& state,
-                 std::span<const Index> phyxels) {
-  const std::vector<Vec3d> free = free_axes(model);
-  State next{.displacement = state.displacement, .velocity = state.velocity};
-  for (const Index i : phyxels) {
-    const DampedFlow flow = damped_flow(part_of(model, i).material.damping, now.dt);
-    Vec3d& v = next.velocity[i];
-    v = flow.keep * v + (flow.gain / model.mass[i]) * now.other_force[i];
-    if (!free.empty()) v = by_components(free[i], v);
-    next.displacement[i] += now.dt * v;
-  }
-  if (free.empty()) return next;
-  std::vector<Vec3d> prescribed = next.displacement;
-  prescribe_displacements(model, now.time + now.dt, prescribed);
-  for (const Index i : phyxels) {
-    const Vec3d way = prescribed[i] - state.displacement[i];
-    next.velocity[i] += (1 / now.dt) * (way - by_components(free[i], way));
-    next.displacement[i] = prescribed[i];
-  }
-  return next;
-}
-
-/// What bodies and obstacles do over the step from an instant, on this rank.
-struct NextStep {
-  StepSums sums;               ///< As `StepContacts` and `BodyContacts` would add them.
-  std::vector<double> depths;  ///< Now, of the deepest phyxel of each body in other bodies [m].
-};
-
-NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
-                   const State& state) {
-  StepContacts contacts(model, 1);
-  BodyContacts bodies(model, 1);
-  const std::vector<Index>& layer =
-      bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
-  State next = next_state(model, now, state, layer);
-  NextStep made;
-  contacts.put_rigid(state.rigid, now.dt);
-  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
-  if (bodies.acts()) {
-    const auto of = [](const State& s) {
-      return [&s](Index i) { return SurfaceState{s.displacement[i], s.velocity[i]}; };
-    };
-    bodies.begin_step(now.dt, of(state));
-    std::vector<Mat3d> gradient;
-    if (bodies.any()) backend.displacement_gradients(gradient);
-    for (std::size_t p = 0; p < bodies.count(); ++p) {
-      bodies.set_gradient(p, gradient[bodies.phyxel(p)]);
-    }
-    made.depths = bodies.depths(of(state));
-    bodies.keep_apart(of(next), [&](Index i, const SurfaceState& to) {
-      next.displacement[i] = to.displacement;
-      next.velocity[i] = to.velocity;
-    });
-  }
-  contacts.keep_out([](Index) { return true; },
-                    [&](Index i) {
-                      return Touched{next.displacement[i], next.velocity[i]};
-                    },
-                    [&](Index i, const Touched& to) {
-                      next.displacement[i] = to.displacement;
-                      next.velocity[i] = to.velocity;
-                    });
-  made.sums = contacts.sums();
-  made.sums.insert(made.sums.end(), bodies.sums().begin(), bodies.sums().end());
-  return made;
-}
 
 Vec3d vector_of(std::span<const ExactSum> sums) {
   return {sums[0].value(), sums[1].value(), sums[2].value()};
@@ -127,16 +59,6 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   rates.sums.resize(ContactTerms::count * touching_count(model));
   penalty.add_to(at, state.displacement, state.velocity, rates.span, rates.sums);
   return rates;
-}
-
-/// The obstacles at a time [s], free ones in their states.
-PlacedObstacles obstacles_now(const Model& model, double time, std::span<const RigidState> rigid) {
-  PlacedObstacles placed;
-  std::size_t free = 0;
-  for (const Obstacle& obstacle : model.obstacles) {
-    placed.push_back(obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(time, 0));
-  }
-  return placed;
 }
 
 /// Depths of the deepest phyxel of the contact layer in each obstacle [m], 0 if none is inside. Of
@@ -220,8 +142,9 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
     say_wrong(
         model,
         fmt::format("phyxels{} are {:.3g} m deep in {}, a quarter of a support of {:.3g} m is "
-                    "allowed: something presses them into it, or they are too fast for the step",
-                    whose, reading.depth, where, support));
+                    "allowed: something presses them into it, or they are too fast for the step{}",
+                    whose, reading.depth, where, support,
+                    has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
   }
 }
 

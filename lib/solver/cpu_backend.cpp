@@ -235,6 +235,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     apply_loads(time);
     contacts_.begin_step(time, dt, [&](Index i) { return velocity_of(i); });
     if (body_contacts_.acts()) return advance_apart(time, dt);
+    contacts_.push(touched(), touch());
     this->pass(this->displacement_records(), [&](const std::vector<Run>& runs) {
       for (const Run& run : runs) this->advance_run(run, dt);
       if (&runs == &boundary_runs_) end_step(time, dt, true);  // before they are sent
@@ -251,15 +252,18 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     };
     body_contacts_.begin_step(dt, state_of);
     set_contact_gradients();
+    const auto set_state = [&](Index i, const SurfaceState& to) {
+      this->set_state(i, to.displacement, to.velocity);
+    };
+    body_contacts_.push_apart(state_of, set_state);
+    contacts_.push(touched(), touch());
     const auto advance_all = [&](const std::vector<Run>& runs) {
       for (const Run& run : runs) this->advance_run(run, dt);
     };
     advance_all(boundary_runs_);
     advance_all(interior_runs_);
     for (const bool of_boundary : {true, false}) this->follow_motions(time, dt, of_boundary);
-    body_contacts_.keep_apart(state_of, [&](Index i, const SurfaceState& to) {
-      this->set_state(i, to.displacement, to.velocity);
-    });
+    body_contacts_.keep_apart(state_of, set_state);
     contacts_.keep_out([](Index) { return true; }, touched(), touch());
     contacts_.end_step();
     if (model_.share) this->refresh(this->displacement_records());

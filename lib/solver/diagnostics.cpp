@@ -13,11 +13,14 @@
 #include "phyxel/physics/hourglass.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
+#include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/contact_stiffness.hpp"
 #include "solver/first_error.hpp"
 #include "solver/following_loads.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/part_law.hpp"
+#include "solver/present_forces.hpp"
 #include "solver/rigid_bodies.hpp"
 #include "solver/step_sums.hpp"
 #include "solver/totals.hpp"
@@ -135,6 +138,51 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   return *d;
 }
 
+namespace {
+
+/// Adds to diagnostics what penalties do: their energy, and the changes of velocities by their
+/// forces in the half step that leads from velocities to the present. What bodies have taken from
+/// each other's motion is stored, but for what has been lost as normals turned. Of a
+/// share: collective.
+void add_penalties(const Model& model, Backend& backend, const Solver& solver, Diagnostics& d) {
+  const PresentForces present(model, backend, solver);
+  const State& state = present.state();
+  const std::vector<Vec3d> free = free_axes(model);
+  const PresentContact& contact = present.contact();
+  // Energies, those of bodies, momentum, angular momentum.
+  std::vector<ExactSum> sums(10);
+  sums[0] = contact.energy;
+  sums[2] = contact.energy_of_bodies;
+  for (const Part& part : model.parts) {
+    const DampedFlow half = damped_flow(part.material.damping, solver.now().lag);
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      const Vec3d push = contact.force[i];
+      if (push == Vec3d{}) continue;
+      Vec3d change = (half.gain / model.mass[i]) * push;
+      if (!free.empty()) change = by_components(free[i], change);
+      const Vec3d after = half.keep * state.velocity[i] +
+                          (half.gain / model.mass[i]) * present.instant().other_force[i];
+      const Vec3d momentum = model.mass[i] * change;
+      const Vec3d turning = cross(model.position[i] + state.displacement[i], momentum);
+      // Changes are zero along prescribed axes, on which the velocity is another one.
+      const Vec3d mean = after - 0.5 * change;
+      sums[1].add(dot(momentum, mean));
+      const Vec3d of_bodies = half.gain * contact.of_bodies[i];
+      sums[3].add(dot(free.empty() ? of_bodies : by_components(free[i], of_bodies), mean));
+      const double all[] = {momentum.x, momentum.y, momentum.z, turning.x, turning.y, turning.z};
+      for (int k = 0; k < 6; ++k) sums[4 + k].add(all[k]);
+    }
+  }
+  add_over_ranks(model, sums);
+  d.contact_energy = sums[0].value();
+  d.kinetic_energy += sums[1].value();
+  d.contact_loss -= sums[2].value() + sums[3].value();
+  d.momentum += Vec3d{sums[4].value(), sums[5].value(), sums[6].value()};
+  d.angular_momentum += Vec3d{sums[7].value(), sums[8].value(), sums[9].value()};
+}
+
+}  // namespace
+
 Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver) {
   Diagnostics d = diagnose(model, backend, solver.now());
   if (touching_count(model) == 0) return d;
@@ -147,6 +195,9 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver)
     loss.add(all[first + ContactTerms::impact_loss].value());
   }
   d.contact_loss += loss.value();
+  if (solver.method() == Method::verlet && has_penalties(model)) {
+    add_penalties(model, backend, solver, d);
+  }
   check_contact_speeds(model, solver, d.largest_speed, backend.rigid_states());
   return d;
 }

@@ -8,6 +8,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/following_loads.hpp"
+#include "solver/present_contact.hpp"
 #include "solver/step_sums.hpp"
 
 namespace phyxel {
@@ -32,10 +33,15 @@ class PresentForces {
     const std::span<const Vec3d> external = backend.external_forces();
     for (std::size_t i = 0; i < external.size(); ++i) force_[i] += external[i];
     for (std::size_t i = 0; i < force_.size(); ++i) force_[i] += model.mass[i] * model.gravity;
+    if (solver.method() != Method::verlet) return;
+    contact_ = present_contact(model, backend, state_, time_, dt_);
+    for (std::size_t i = 0; i < contact_.force.size(); ++i) force_[i] += contact_.force[i];
   }
 
   /// The present state.
   const State& state() const { return state_; }
+  /// What penalties do in Verlet's steps; their forces are among those of the instant.
+  const PresentContact& contact() const { return contact_; }
   /// The instant for `for_each_support_force`, which refers to this object.
   SupportInstant instant() const { return {time_, dt_, single_, state_.velocity, force_}; }
 
@@ -43,6 +49,7 @@ class PresentForces {
   double time_, dt_;  // [s]; dt 0: at rest
   bool single_;
   State state_;
+  PresentContact contact_;
   std::vector<Vec3d> force_;  // [N]
 };
 

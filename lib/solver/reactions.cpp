@@ -3,6 +3,8 @@
 #include <limits>
 
 #include "rank_sums.hpp"
+#include "solver/body_penalty.hpp"
+#include "solver/next_step.hpp"
 #include "solver/present_forces.hpp"
 #include "solver/step_sums.hpp"
 
@@ -56,22 +58,50 @@ Path rest_of_work(const Motion& motion, const Solver& solver) {
   return rest;
 }
 
+/// All forces but those of supports, with those of other bodies on phyxels that are held [N]. Of a
+/// share: collective.
+std::vector<Vec3d> forces_on_supports(const Model& model, Backend& backend, const Solver& solver,
+                                      const PresentForces& present) {
+  const std::span<const Vec3d> others = present.instant().other_force;
+  std::vector<Vec3d> all(others.begin(), others.end());
+  if (!model.body_contact.acts() || !solver.end_force().empty()) return all;
+  const State& state = present.state();
+  if (solver.method() == Method::verlet) {
+    const NextStep next = next_step(model, backend, present.instant(), state);
+    for (std::size_t i = 0; i < all.size(); ++i) all[i] += next.of_bodies[i];
+  } else if (solver.method() == Method::equilibrium) {
+    BodyPenalty penalty(model);
+    std::vector<Mat3d> gradient;
+    backend.displacement_gradients(gradient);
+    penalty.linearise(state.displacement, gradient);
+    penalty.add(state.displacement, all);
+  }
+  return all;
+}
+
 }  // namespace
 
 std::vector<Reaction> find_reactions(const Model& model, Backend& backend, const Solver& solver) {
   check_fits(model, backend);
   if (model.motions.empty()) return {};
   const PresentForces present(model, backend, solver);
+  const std::vector<Vec3d> others = forces_on_supports(model, backend, solver, present);
+  SupportInstant now = present.instant();
+  now.other_force = others;
   const std::vector<Vec3d> centres = centres_of(model);
   std::vector<ReactionSums> sums(model.motions.size());
   for (std::size_t m = 0; m < model.motions.size(); ++m) {
     const Motion& motion = model.motions[m];
     const Path rest = rest_of_work(motion, solver);
-    for_each_support_force(model, motion, present.instant(), [&](Index i, Vec3d force) {
+    for_each_support_force(model, motion, now, [&](Index i, Vec3d force) {
       const Vec3d x = model.position[i], arm = x + present.state().displacement[i] - centres[m];
       sums[m].force.add(force);
       sums[m].torque.add(cross(arm, force));
-      if (!motion.stands_still()) sums[m].rest_of_work.add(dot(force, rest.at(x)));
+    });
+    if (motion.stands_still()) continue;
+    // Steps add the work of reactions to all but other bodies.
+    for_each_support_force(model, motion, present.instant(), [&](Index i, Vec3d force) {
+      sums[m].rest_of_work.add(dot(force, rest.at(model.position[i])));
     });
   }
   add_each_over_ranks(model, sums);

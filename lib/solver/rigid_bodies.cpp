@@ -69,7 +69,7 @@ void RigidBodies::begin_step(double time, double dt) {
   }
 }
 
-void RigidBodies::end_step(std::span<const ExactSum> sums) {
+void RigidBodies::act_back(std::span<const ExactSum> sums) {
   if (empty()) return;
   StepSums of_step;
   for (const std::size_t o : bodies_) {
@@ -92,9 +92,9 @@ void RigidBodies::end_step(std::span<const ExactSum> sums) {
     };
     const Vec3d impulse = vector(ContactTerms::impulse), moment = vector(ContactTerms::moment);
     RigidState& state = states_[k];
-    state.impulse = -impulse;
+    state.impulse += -impulse;
     // Sums are about the place at rest; the impulses act where the phyxels were as the step began.
-    state.angular_impulse = cross(state.place - obstacle.place, impulse) - moment;
+    state.angular_impulse += cross(state.place - obstacle.place, impulse) - moment;
   }
 }
 

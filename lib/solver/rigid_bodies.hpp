@@ -31,9 +31,13 @@ class RigidBodies {
   void begin_step(double time, double dt);
   /// Where an obstacle that is a free body is at the end of the step, and how it moves.
   const ObstacleStep& step_of(std::size_t obstacle) const { return steps_[number_[obstacle]]; }
-  /// Lets what the step has done to phyxels act back. Of a share: collective.
+  /// Where an obstacle that is a free body is before the step, and how it moves.
+  ObstacleStep start_of(std::size_t obstacle) const {
+    return model_.obstacles[obstacle].placed(states_[number_[obstacle]]);
+  }
+  /// Lets what obstacles have done to phyxels since the last call act back. Of a share: collective.
   /// @param sums of all obstacles and steps so far, of this rank (`ContactTerms`)
-  void end_step(std::span<const ExactSum> sums);
+  void act_back(std::span<const ExactSum> sums);
 
  private:
   const Model& model_;
@@ -41,7 +45,7 @@ class RigidBodies {
   std::vector<std::size_t> number_;  // of each obstacle among these
   std::vector<RigidState> states_;
   std::vector<ObstacleStep> steps_;  // of the present step
-  StepSums earlier_;                 // impulses and angular impulses before the present step
+  StepSums earlier_;                 // impulses and angular impulses at the last call of `act_back`
   RigidContacts contacts_;
 };
 

@@ -12,6 +12,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/following_loads.hpp"
+#include "solver/present_contact.hpp"
 #include "solver/present_forces.hpp"
 
 namespace phyxel {
@@ -110,6 +111,11 @@ void Solver::change_step(std::int64_t steps, double dt) {
   State state = this->state();
   const Vectors before = accelerations.at(state, HistoryUse::trial),
                 elastic = accelerations.at(state, HistoryUse::frozen);
+  const PresentContact contact = present_contact(*model_, backend_, state, time(), dt_);
+  const auto pushed = [&](Index i, Vec3d acceleration) {  // by penalties, too
+    if (contact.force.empty()) return acceleration;
+    return acceleration + accelerations.free(i, (1 / model_->mass[i]) * contact.force[i]);
+  };
   Vectors v(before.size());  // at t
   const auto for_each = [&](auto&& each) {
     for (const Part& part : model_->parts) {
@@ -118,7 +124,7 @@ void Solver::change_step(std::int64_t steps, double dt) {
   };
   for_each([&](Index i, double damping) {
     const DampedFlow flow = damped_flow(damping, dt_ / 2);
-    v[i] = accelerations.free(i, flow.keep * state.velocity[i] + flow.gain * before[i]);
+    v[i] = accelerations.free(i, flow.keep * state.velocity[i] + flow.gain * pushed(i, before[i]));
   });
   const Vectors rates = accelerations.derivatives(state, elastic, v);
   const Vectors along_itself = accelerations.derivatives(state, elastic, elastic),
@@ -136,7 +142,7 @@ void Solver::change_step(std::int64_t steps, double dt) {
   const Vectors after = accelerations.at(state, HistoryUse::trial);
   for_each([&](Index i, double damping) {
     // Prescribed velocities stay what they are.
-    const Vec3d earlier = velocity_before(v[i], after[i], damping, dt / 2);
+    const Vec3d earlier = velocity_before(v[i], pushed(i, after[i]), damping, dt / 2);
     state.velocity[i] += accelerations.free(i, earlier - state.velocity[i]);
   });
   for (RigidState& body : state.rigid) body.velocity += ((dt_ - dt) / 2) * model_->gravity;

@@ -12,7 +12,9 @@
 #include "model/contact_groups.hpp"
 #include "model/parts.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/physics/contact_penalty.hpp"
 #include "phyxel/physics/obstacles.hpp"
+#include "solver/contact_stiffness.hpp"
 #include "solver/rigid_bodies.hpp"
 #include "solver/step_sums.hpp"
 
@@ -38,6 +40,17 @@ inline std::vector<double> inertia_of_layer(const Model& model, double dt) {
   return inertia;
 }
 
+/// Returns the inertia of each phyxel of the contact layer against what changes its velocity as a
+/// step starts [kg/s] (`PushedPoint`).
+inline std::vector<double> start_inertia_of_layer(const Model& model, double dt) {
+  std::vector<double> inertia = inertia_of_layer(model, dt);
+  for (std::size_t k = 0; k < inertia.size(); ++k) {
+    const Part& part = part_of(model, model.contact.phyxels[k]);
+    inertia[k] *= damped_flow(part.material.damping, dt).keep;
+  }
+  return inertia;
+}
+
 /// The state of a phyxel at the end of a step.
 struct Touched {
   Vec3d displacement;  ///< [m]
@@ -59,7 +72,9 @@ class StepContacts {
         rigid_(model) {
     for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
       if (!model.obstacles[o].stands_still()) moving_.push_back(o);
+      pushes_ = pushes_ || model.obstacles[o].penalty > 0;
     }
+    if (pushes_) stiffness_ = stiffness_of_layer(model, share_of_layer);
   }
 
   /// Sets the states of free bodies, as of `RigidBodies::put`.
@@ -78,40 +93,54 @@ class StepContacts {
       for (const Obstacle& obstacle : model_.obstacles) {
         steps_.push_back(obstacle.step_from(time, dt));
       }
+      if (pushes_) {
+        start_inertia_ = start_inertia_of_layer(model_, dt);
+        starts_ = steps_;
+      }
     }
-    rigid_.begin_step(time, dt);
     for (const std::size_t o : moving_) {
       const Obstacle& obstacle = model_.obstacles[o];
-      steps_[o] = obstacle.free ? rigid_.step_of(o) : obstacle.step_from(time, dt);
+      if (!obstacle.free) steps_[o] = obstacle.step_from(time, dt);
+      if (!pushes_) continue;
+      starts_[o] = obstacle.free ? rigid_.start_of(o) : obstacle.stage_to(time, dt);
     }
+    time_ = time;
 #pragma omp parallel for schedule(static) num_threads(threads_here())
     for (std::size_t k = 0; k < before_.size(); ++k) {
       before_[k] = velocity_of(model_.contact.phyxels[k]);
     }
   }
-  /// Moves phyxels that the step has led into obstacles out of them, one obstacle after the other.
+  /// Changes the velocities with which the step starts by the penalties of obstacles, and moves
+  /// free bodies. Of a share: collective.
+  /// @param get,set return and replace the state of a phyxel
+  template <class Get, class Set>
+  void push(Get&& get, Set&& set) {
+    if (pushes_) push_by_penalties(get, set);
+    if (rigid_.empty()) return;
+    rigid_.begin_step(time_, dt_);
+    for (const std::size_t o : moving_) {
+      if (model_.obstacles[o].free) steps_[o] = rigid_.step_of(o);
+    }
+  }
+  /// Moves phyxels that the step has led into obstacles out of them, one obstacle after the other,
+  /// and lets those rub on obstacles that penalties push.
   /// @param is_meant tells which phyxels this call is for
   /// @param get,set return and replace the state of a phyxel
   template <class IsMeant, class Get, class Set>
   void keep_out(IsMeant&& is_meant, Get&& get, Set&& set) {
     if (model_.obstacles.empty()) return;
-#pragma omp parallel num_threads(threads_here())
-    {
-      std::map<std::size_t, StepSums> own;  // of the obstacles that this thread's phyxels touch
-#pragma omp for schedule(static) nowait
-      for (std::size_t g = 0; g < groups_.size(); ++g) keep_group_out(g, is_meant, get, set, own);
-      if (!own.empty()) {
-#pragma omp critical(phyxel_contact_sums)
-        for (const auto& [o, sums] : own) {
-          for (int s = 0; s < ContactTerms::count; ++s) {
-            sums_[o * ContactTerms::count + s].add(sums[s]);
-          }
-        }
-      }
-    }
+    each_touch(
+        steps_, is_meant, get,
+        [&](std::size_t o) {
+          const Obstacle& obstacle = model_.obstacles[o];
+          return !(obstacle.penalty > 0) || obstacle.law.static_friction > 0;
+        },
+        [&](const auto& shape, std::size_t o, std::size_t k, ContactTerms& terms) {
+          return keep_out_of(shape, o, k, get, set, terms);
+        });
   }
   /// Ends a step, after all phyxels have been kept out. Of a share: collective.
-  void end_step() { rigid_.end_step(sums_); }
+  void end_step() { rigid_.act_back(sums_); }
   /// The sums so far, obstacle by obstacle (`ContactTerms`).
   const StepSums& sums() const { return sums_; }
   /// Bytes of its arrays.
@@ -123,10 +152,26 @@ class StepContacts {
       if (is_new) distances += obstacle.distances->bytes();
     }
     return distances + sums_.size() * sizeof(ExactSum) +
-           (free_.size() + before_.size()) * sizeof(Vec3d) + inertia_.size() * sizeof(double);
+           (free_.size() + before_.size()) * sizeof(Vec3d) +
+           (inertia_.size() + start_inertia_.size() + stiffness_.size()) * sizeof(double);
   }
 
  private:
+  template <class Get, class Set>
+  void push_by_penalties(Get&& get, Set&& set) {
+    const auto by = [&](const auto& shape, std::size_t o, std::size_t k, ContactTerms& terms) {
+      const Index i = model_.contact.phyxels[k];
+      const Touched now = get(i);
+      const Vec3d change = penalty_change(shape, starts_[o], pushed(o, k, now), terms);
+      if (change == Vec3d{}) return false;
+      set(i, {now.displacement, now.velocity + change});
+      return true;
+    };
+    each_touch(
+        starts_, [](Index) { return true; }, get,
+        [&](std::size_t o) { return model_.obstacles[o].penalty > 0; }, by);
+    rigid_.act_back(sums_);
+  }
   int threads_here() const {
     return std::clamp(static_cast<int>(before_.size() / 1000), 1, threads_);
   }
@@ -149,9 +194,34 @@ class StepContacts {
     }
     std::sort(near.obstacles.begin(), near.obstacles.end());
   }
-  template <class IsMeant, class Get, class Set>
-  void keep_group_out(std::size_t g, IsMeant&& is_meant, Get&& get, Set&& set,
-                      std::map<std::size_t, StepSums>& sums) {
+  /// Calls act(shape, o, k, terms) for phyxels k of the layer that may touch obstacles o, one
+  /// obstacle after the other, and adds the terms to the sums of the obstacle where that is true.
+  /// @param at where obstacles are. @param is_meant tells which phyxels are meant
+  /// @param get returns the state of a phyxel. @param acts tells which obstacles are meant
+  template <class IsMeant, class Get, class Acts, class Act>
+  void each_touch(const std::vector<ObstacleStep>& at, IsMeant&& is_meant, Get&& get, Acts&& acts,
+                  Act&& act) {
+#pragma omp parallel num_threads(threads_here())
+    {
+      std::map<std::size_t, StepSums> own;  // of the obstacles that this thread's phyxels touch
+#pragma omp for schedule(static) nowait
+      for (std::size_t g = 0; g < groups_.size(); ++g) {
+        each_of_group(g, at, is_meant, get, acts, act, own);
+      }
+      if (!own.empty()) {
+#pragma omp critical(phyxel_contact_sums)
+        for (const auto& [o, sums] : own) {
+          for (int s = 0; s < ContactTerms::count; ++s) {
+            sums_[o * ContactTerms::count + s].add(sums[s]);
+          }
+        }
+      }
+    }
+  }
+  /// The same for the phyxels of a group. @param sums those of this thread
+  template <class IsMeant, class Get, class Acts, class Act>
+  void each_of_group(std::size_t g, const std::vector<ObstacleStep>& at, IsMeant&& is_meant,
+                     Get&& get, Acts&& acts, Act&& act, std::map<std::size_t, StepSums>& sums) {
     const LayerGroup& group = groups_[g];
     const std::vector<Index>& layer = model_.contact.phyxels;
     NearObstacles& near = near_[g];
@@ -165,17 +235,15 @@ class StepContacts {
       if (!is_within(box, near.box)) find_near(g, box);
     };
     find_box();
-    for (std::size_t at = 0; at < near.obstacles.size(); ++at) {
-      const std::size_t o = near.obstacles[at];
+    for (std::size_t n = 0; n < near.obstacles.size(); ++n) {
+      const std::size_t o = near.obstacles[n];
       const Obstacle& obstacle = model_.obstacles[o];
-      if (is_clear_of(obstacle, steps_[o], box, group.offset)) continue;
+      if (!acts(o) || is_clear_of(obstacle, at[o], box, group.offset)) continue;
       StepSums* own = nullptr;
       ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
         for (std::size_t k = group.begin; k < group.end; ++k) {
           ContactTerms terms;
-          if (!is_meant(layer[k]) || !keep_out_of(shape, steps_[o], k, layer[k], get, set, terms)) {
-            continue;
-          }
+          if (!is_meant(layer[k]) || !act(shape, o, k, terms)) continue;
           if (!own) own = &sums.try_emplace(o, ContactTerms::count).first->second;
           for (int s = 0; s < ContactTerms::count; ++s) (*own)[s].add(terms.value[s]);
         }
@@ -183,14 +251,16 @@ class StepContacts {
       if (!own) continue;
       // What has been pushed out of this obstacle may have been led into another one.
       find_box();
-      at = static_cast<std::size_t>(
+      n = static_cast<std::size_t>(
           std::upper_bound(near.obstacles.begin(), near.obstacles.end(), o) -
           near.obstacles.begin() - 1);
     }
   }
   template <class Shape, class Get, class Set>
-  bool keep_out_of(const Shape& shape, const ObstacleStep& step, std::size_t k, Index i, Get&& get,
-                   Set&& set, ContactTerms& terms) const {
+  bool keep_out_of(const Shape& shape, std::size_t o, std::size_t k, Get&& get, Set&& set,
+                   ContactTerms& terms) const {
+    const Index i = model_.contact.phyxels[k];
+    const ObstacleStep& step = steps_[o];
     const Touched now = get(i);
     TouchingPoint point{model_.position[i] + now.displacement,
                         now.velocity,
@@ -198,23 +268,37 @@ class StepContacts {
                         free_[k],
                         model_.contact.offset[k],
                         inertia_[k]};
-    if (!touch(shape, step, point, terms)) return false;
+    const double penalty = model_.obstacles[o].penalty;
+    const bool touches = penalty > 0 ? rub(shape, step, penalty * stiffness_[k], point, terms)
+                                     : touch(shape, step, point, terms);
+    if (!touches) return false;
     set(i, {now.displacement + step.dt * (point.velocity - now.velocity), point.velocity});
     return true;
+  }
+  /// A phyxel of the layer that the penalty of an obstacle may push as the step starts.
+  PushedPoint pushed(std::size_t o, std::size_t k, const Touched& now) const {
+    return {model_.position[model_.contact.phyxels[k]] + now.displacement, free_[k],
+            model_.contact.offset[k], model_.obstacles[o].penalty * stiffness_[k],
+            start_inertia_[k]};
   }
 
   const Model& model_;
   int threads_;
   StepSums sums_;
-  std::vector<Vec3d> free_;          // as of `TouchingPoint`, shape [layer]
-  std::vector<Vec3d> before_;        // velocities at the start of the step [m/s], shape [layer]
-  std::vector<double> inertia_;      // [kg/s], shape [layer]
-  std::vector<ObstacleStep> steps_;  // of the present step
+  std::vector<Vec3d> free_;            // as of `TouchingPoint`, shape [layer]
+  std::vector<Vec3d> before_;          // velocities at the start of the step [m/s], shape [layer]
+  std::vector<double> inertia_;        // [kg/s], shape [layer]
+  bool pushes_ = false;                // true if an obstacle acts by penalties; else all empty:
+  std::vector<double> start_inertia_;  // of `PushedPoint` [kg/s], shape [layer]
+  std::vector<double> stiffness_;      // of penalties of 1 [N/m], shape [layer]
+  std::vector<ObstacleStep> starts_;   // where obstacles are as the present step starts
+  std::vector<ObstacleStep> steps_;    // of the present step
   std::vector<LayerGroup> groups_;
   std::vector<NearObstacles> near_;  // of each group
   std::vector<std::size_t> moving_;  // obstacles that do not stand still
   RigidBodies rigid_;
-  double dt_ = 0;                    // of `inertia_` [s]
+  double time_ = 0;  // at which the present step starts [s]
+  double dt_ = 0;    // of `inertia_` [s]
 };
 
 }  // namespace phyxel

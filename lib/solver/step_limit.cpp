@@ -9,6 +9,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/contact_stiffness.hpp"
 #include "solver/start_vector.hpp"
 #include "stage.hpp"
 
@@ -178,11 +179,19 @@ Frequency largest_frequency(const Model& model, Vibration& vibration, double tol
   return found;
 }
 
+/// The largest eigenfrequency of a model and of the springs that contact may add: squares of
+/// frequencies add to each other at most. Of a share: collective.
+/// @param omega of the model alone [rad/s]
+double with_contact(const Model& model, double omega) {
+  const double of_contact = contact_frequency(model);
+  return of_contact > 0 && omega > 0 ? std::hypot(omega, of_contact) : omega;
+}
+
 StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
   StepLimit limit;
   limit.sound_step = smallest_sound_step(model);
   const Frequency found = largest_frequency(model, vibration, 0.002, &stage);
-  limit.omega_max = found.omega;
+  limit.omega_max = with_contact(model, found.omega);
   limit.iterations = found.iterations;
   if (!(limit.omega_max > 0) || !std::isfinite(limit.omega_max)) {
     const std::string why =
@@ -247,8 +256,8 @@ StepLimit present_step_limit(const Model& model, Backend& backend) {
     backend.put_displacements(present.displacement);
   }
   StepLimit limit;
-  limit.omega_max = found.omega;
-  limit.largest_step = stable_step(found.omega, largest_viscosity(model));
+  limit.omega_max = with_contact(model, found.omega);
+  limit.largest_step = stable_step(limit.omega_max, largest_viscosity(model));
   limit.iterations = found.iterations;
   return limit;
 }

@@ -9,6 +9,7 @@
 #include "rank_exchange.hpp"
 #include "solver/body_contacts.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/contact_stiffness.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -203,6 +204,17 @@ void TouchingPoints::refresh(std::vector<T>& of_points) const {
 }
 template void TouchingPoints::refresh(std::vector<SurfaceMotion>&) const;
 template void TouchingPoints::refresh(std::vector<Vec3d>&) const;
+template void TouchingPoints::refresh(std::vector<double>&) const;
+
+std::vector<double> TouchingPoints::wave_moduli() const {
+  std::vector<double> modulus(site_.size());
+  for (std::size_t p = 0; p < own_.size(); ++p) {
+    const Index i = model_.body_contact.layer.phyxels[own_[p]];
+    modulus[p] = pressure_wave_modulus(part_of(model_, i).material);
+  }
+  refresh(modulus);
+  return modulus;
+}
 
 std::size_t TouchingPoints::bytes() const {
   return (layer_.size() + site_.size()) * sizeof(SurfaceSite) +

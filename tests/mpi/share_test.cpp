@@ -109,7 +109,7 @@ Model touching() {
 }
 
 /// Two bodies that fly into each other, one of which is held at an end.
-Model colliding() {
+Model colliding(const ContactRequest& contact) {
   Scene scene;
   for (const char* shape : {"beam", "block"}) {
     const bool is_first = scene.bodies.empty();
@@ -123,20 +123,22 @@ Model colliding() {
     if (is_first) body.fixed.push_back({.select = {.region = "x-"}});
     scene.bodies.push_back(body);
   }
-  scene.contact = ContactRequest{.friction = 0.4, .sweeps = 2};
+  scene.contact = contact;
   return build_model(scene);
 }
+Model colliding_hard() { return colliding({.friction = 0.4, .sweeps = 2}); }
+Model colliding_softly() { return colliding({.friction = 0.4, .method = ContactMethod::penalty}); }
 
 struct ShareCase {
   const char* name;
   Model (*make)();
 };
 const std::vector<ShareCase>& share_cases() {
-  static const std::vector<ShareCase> cases{{"Cube", testing::cube},     {"Coil", testing::coil},
-                                            {"Thread", testing::thread}, {"Apart", testing::apart},
-                                            {"Tiny", testing::tiny},     {"Everything", everything},
-                                            {"Controlled", controlled},  {"Custom", custom},
-                                            {"Touching", touching},      {"Colliding", colliding}};
+  static const std::vector<ShareCase> cases{
+      {"Cube", testing::cube},       {"Coil", testing::coil},     {"Thread", testing::thread},
+      {"Apart", testing::apart},     {"Tiny", testing::tiny},     {"Everything", everything},
+      {"Controlled", controlled},    {"Custom", custom},          {"Touching", touching},
+      {"Colliding", colliding_hard}, {"Softly", colliding_softly}};
   return cases;
 }
 
@@ -272,6 +274,10 @@ TEST_P(Shares, MoveAsTheWholeToTheLastBit) {
       EXPECT_EQ(touched[o].depth, here_too[o].depth);
       EXPECT_GT(norm(touched[o].impulse), 0);
     }
+    const Diagnostics at_all = diagnose(whole_, *alone, whole),
+                      here_at_all = diagnose(model_, *here, share);
+    EXPECT_EQ(at_all.total_energy(), here_at_all.total_energy());
+    EXPECT_EQ(at_all.contact_energy, here_at_all.contact_energy);
     const Diagnostics d = diagnose(whole_, *alone, steps, dt),
                       e = diagnose(model_, *here, steps, dt);
     EXPECT_EQ(d.total_energy(), e.total_energy());

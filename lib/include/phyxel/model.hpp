@@ -125,6 +125,8 @@ struct Obstacle {
   Mat3d turn{};         ///< Its rotation into place at rest.
   Vec3d place;          ///< Where its origin is at rest [m].
   ContactLaw law;
+  /// Stiffness of its penalties in Verlet's steps, over that of a layer of phyxels; 0: projected.
+  double penalty = 0;
   Motion motion;  ///< Its path; no phyxels follow it.
   /// Set for a free rigid body, which has no path: forces move it.
   std::optional<RigidMass> free;
@@ -201,6 +203,7 @@ struct BodyContact {
   bool all = true;          ///< True if other pairs touch, too.
   bool self = false;        ///< True if parts of one body touch each other, too.
   int sweeps = 1;           ///< How often contact is resolved in each step.
+  double penalty = 0;       ///< As of `Obstacle`.
   /// Those of each body, by its number. Empty in scenes without such contact.
   std::vector<BodyDistances> distances;
   /// The phyxels by which bodies touch each other, held and moved ones, too.

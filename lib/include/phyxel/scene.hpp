@@ -25,6 +25,13 @@ enum class Precision { single, double_, mixed };
 /// found directly.
 enum class Method { verlet, implicit, equilibrium };
 
+/// Contact in Verlet's steps. `projected`: points are moved out of what a step has led them into.
+/// `penalty`: springs push them back, whose energy is kept.
+enum class ContactMethod { projected, penalty };
+
+/// Stiffness of penalties by default, as a share of that of a layer of phyxels.
+inline constexpr double default_contact_stiffness = 0.1;
+
 /// "float", "double" or "mixed".
 const char* precision_name(Precision precision);
 
@@ -217,6 +224,8 @@ struct ObstacleRequest {
   double friction = 0;          ///< Coulomb's coefficient of points at rest on it.
   std::optional<double> kinetic_friction;  ///< The same of sliding points; unset: `friction`.
   double restitution = 0;  ///< Speed of a surface point after an impact over that before.
+  std::optional<ContactMethod> method;  ///< Unset: that of the scene's `ContactRequest`.
+  std::optional<double> stiffness;      ///< Of penalties, likewise.
   /// How it moves, but for the selection and the axes; nothing set: it is at rest.
   MotionRequest motion;
   std::optional<double> density;  ///< Of a free rigid body [kg/m³]; unset: forces do not move it.
@@ -239,7 +248,9 @@ struct ContactRequest {
   std::optional<double> kinetic_friction;  ///< The same of sliding points; unset: `friction`.
   double restitution = 0;  ///< Speed of a surface point after an impact over that before.
   bool self = false;       ///< True if parts of one body touch each other, too.
-  int sweeps = 4;          ///< How often contact is resolved in each step.
+  int sweeps = 4;          ///< How often contact is resolved in each step, if projected.
+  ContactMethod method = ContactMethod::projected;
+  double stiffness = default_contact_stiffness;  ///< Of penalties, over that of a layer of phyxels.
   std::vector<ContactPairRequest> pairs;
   /// Whether all bodies touch each other, not only those of `pairs`; unset: if there are no pairs.
   std::optional<bool> all;

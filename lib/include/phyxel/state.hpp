@@ -118,6 +118,7 @@ struct Diagnostics {
   double plastic_work = 0;      ///< [J], turned into heat since the virgin state.
   double viscous_work = 0;      ///< [J], turned into heat by viscosity since the start.
   double contact_loss = 0;      ///< [J], lost in impacts and by friction on obstacles since t = 0.
+  double contact_energy = 0;    ///< [J], stored in the springs of contact by penalties.
   double gravity_energy = 0;    ///< [J], zero at rest.
   double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// Energy of the deformation [J].
@@ -128,7 +129,7 @@ struct Diagnostics {
   /// damping, motions and changing loads (`is_conservative`).
   double total_energy() const {
     return kinetic_and_elastic_energy() + plastic_work + viscous_work + contact_loss +
-           gravity_energy + load_energy;
+           contact_energy + gravity_energy + load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.

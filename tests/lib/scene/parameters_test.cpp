@@ -257,7 +257,9 @@ rotation = [0, 90, 0] # obstacle.rotation => rotation = [0, 80, 0]
 translation = [9, 0, 0] # obstacle.translation => translation = [8, 0, 0]
 friction = 0.5 # obstacle.friction => friction = 0.6
 kinetic_friction = 0.4 # obstacle.kinetic_friction => kinetic_friction = 0.3
-restitution = 0.1 # obstacle.restitution => restitution = 0.2
+restitution = 0 # obstacle.restitution => restitution = 0.2
+method = 'projected' # obstacle.method => method = 'penalty'
+stiffness = 0.2 # obstacle.stiffness => stiffness = 0.3
 [obstacle.motion]
 displacement = [1, 0, 0] # obstacle.motion.displacement => displacement = [2, 0, 0]
 rotation = [0, 0, 9] # obstacle.motion.rotation => rotation = [0, 0, 8]
@@ -275,7 +277,9 @@ normal = [0, 0, 1] # obstacle.normal => normal = [0, 1, 1]
 [contact]
 friction = 0.5 # contact.friction => friction = 0.6
 kinetic_friction = 0.4 # contact.kinetic_friction => kinetic_friction = 0.3
-restitution = 0.1 # contact.restitution => restitution = 0.2
+restitution = 0 # contact.restitution => restitution = 0.2
+method = 'projected' # contact.method => method = 'penalty'
+stiffness = 0.2 # contact.stiffness => stiffness = 0.3
 self = true # contact.self => self = false
 sweeps = 2 # contact.sweeps => sweeps = 3
 all = true # contact.all => all = false
@@ -284,7 +288,7 @@ first = 'third' # contact.pair.first => first = 'fourth'
 second = 'seventh' # contact.pair.second => second = 'fifth'
 friction = 0.2 # contact.pair.friction => friction = 0.3
 kinetic_friction = 0.1 # contact.pair.kinetic_friction => kinetic_friction = 0
-restitution = 0.3 # contact.pair.restitution => restitution = 0.4
+restitution = 0 # contact.pair.restitution => restitution = 0.4
 [[obstacle]]
 shape = 'mesh'
 mesh = 'a.obj' # obstacle.mesh => mesh = 'b.obj'

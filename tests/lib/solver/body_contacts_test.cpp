@@ -8,6 +8,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "phyxel/reactions.hpp"
 #include "support/contact_scene.hpp"
 
 namespace phyxel {
@@ -374,6 +375,47 @@ TEST(BodyContacts, LeaveBodiesAtRestThatTouch) {
   way.solver.step(200);
   watch.check(diagnose(way.model, *way.backend, way.solver));
   EXPECT_LE(norm(velocity_of(way, 0)), 1e-6);
+}
+
+/// A block that lies on another one, phyxels of which are held, or falls on it.
+std::string held_block(const std::string& contact, const std::string& held,
+                       const std::string& more) {
+  return "gravity = [0, 0, -9.81]\n" + end + contact +
+         body("lower",
+              "shape = 'block'\nsize = [0.3, 0.3, 0.1]\nspacing = 0.05\nlattice = 'nodes'\n",
+              "translation = [0, 0, -0.05]\n[[body.fixed]]\n" + held) +
+         body("upper",
+              "shape = 'block'\nsize = [0.2, 0.2, 0.1]\nspacing = 0.05\nlattice = 'nodes'\n",
+              "translation = [0.01, 0, 0.05]\n" + more);
+}
+const std::string all_held = "all = true\n";
+
+TEST(BodyContacts, AndReactionsMakeAllChangesOfMomentum) {
+  for (const std::string& held : {all_held, std::string("box = [[-1, -1, -1], [0.01, 1, 1]]\n")}) {
+    for (const std::string method : {"", "method = 'penalty'\n"}) {
+      Way way(
+          held_block(touching + method + "friction = 0.3\n", held, "velocity = [0.2, 0, -0.3]\n"),
+          dt);
+      way.solver.step(40);
+      EXPECT_GT(way.contacts()[1].force.z, 10);
+      const Vec3d before = way.momentum(), weight = way.mass() * way.model.gravity;
+      const Vec3d reaction = find_reactions(way.model, *way.backend, way.solver)[0].force;
+      way.solver.step();
+      const Vec3d missing = (way.momentum() - before) / dt - weight - reaction;
+      EXPECT_LE(norm(missing), 1e-9 * norm(weight)) << held << method;  // rounding
+    }
+  }
+}
+
+TEST(BodyContacts, AtRestOnHeldPhyxelsAreBorneByTheirSupports) {
+  Way way(held_block("[solver]\nmethod = 'equilibrium'\n" + touching, all_held,
+                     "[[body.fixed]]\nall = true\naxes = 'xy'\n"),
+          1);
+  way.solver.step();
+  const double weight = 9.81 * way.mass();
+  // The search leaves residual forces of 1e-8 of what acts.
+  EXPECT_NEAR(find_reactions(way.model, *way.backend, way.solver)[0].force.z, weight,
+              1e-6 * weight);
 }
 
 TEST(BodyContacts, AreRefusedToBodiesThatOverlapAtTheStart) {

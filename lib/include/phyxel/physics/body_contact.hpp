@@ -317,6 +317,22 @@ struct SurfaceForce {
   }
 };
 
+/// Adds Coulomb's friction to the normal part of a force. @param velocity as of `surface_force`
+PHYXEL_HD void add_friction(const SurfaceTouch& touch, const SurfaceResponse& response,
+                            Vec3<double> velocity, const ContactLaw& law, SurfaceForce& force) {
+  if (!(law.static_friction > 0)) return;
+  const Vec3<double> slip = along(touch.normal, velocity);
+  const double speed = std::sqrt(dot(slip, slip));
+  if (!(speed > 0)) return;
+  const Vec3<double> way = (1 / speed) * slip;
+  const double sideways = mobility_along(response.mobility, way);
+  if (!(sideways > 0)) return;
+  const double stop = speed / sideways, hold = law.kinetic_friction * force.push;
+  const double size = stop <= law.static_friction * force.push || stop < hold ? stop : hold;
+  force.tangential = -size * way;
+  force.twist = touch.height * (touch.inverse_spread * force.tangential);
+}
+
 /// The force that gives a point its target velocity w, and Coulomb's friction,
 ///
 ///   f = (w - n̄ · v)/D_n > 0,   f_t = -v_t/|v_t| min(μ f, |v_t|/D_t),
@@ -333,17 +349,7 @@ PHYXEL_HD SurfaceForce surface_force(const SurfaceTouch& touch, const SurfaceRes
   const double rate = response.target - dot(n, velocity);
   if (!(across > 0 && rate > 0)) return force;  // nothing is free to move, or nothing has to
   force.push = rate / across;
-  if (!(law.static_friction > 0)) return force;
-  const Vec3<double> slip = along(n, velocity);
-  const double speed = std::sqrt(dot(slip, slip));
-  if (!(speed > 0)) return force;
-  const Vec3<double> way = (1 / speed) * slip;
-  const double sideways = mobility_along(response.mobility, way);
-  if (!(sideways > 0)) return force;
-  const double stop = speed / sideways, hold = law.kinetic_friction * force.push;
-  const double size = stop <= law.static_friction * force.push || stop < hold ? stop : hold;
-  force.tangential = -size * way;
-  force.twist = touch.height * (touch.inverse_spread * force.tangential);
+  add_friction(touch, response, velocity, law, force);
   return force;
 }
 

@@ -36,6 +36,26 @@ struct ContactChange {
   Vec3<double> normal, tangential;
 };
 
+/// The components of a vector along the axes on which a point is free.
+PHYXEL_HD Vec3<double> freed(const Vec3<double>& free, const Vec3<double>& v) {
+  return {v.x * free.x, v.y * free.y, v.z * free.z};
+}
+
+/// The change of a point's velocity by Coulomb's friction [m/s], -v_t/|v_t| min(μ push, |v_t|).
+/// @param velocity v relative to the surface, after all other forces [m/s]
+/// @param push the change of velocity by the normal force [m/s]. @param free as of `ContactPoint`
+PHYXEL_HD Vec3<double> friction_change(Vec3<double> velocity, Vec3<double> normal,
+                                       const Vec3<double>& free, double push,
+                                       const ContactLaw& law) {
+  const Vec3<double> slip = freed(free, velocity - dot(velocity, normal) * normal);
+  const double speed = std::sqrt(dot(slip, slip));
+  if (!(speed > 0)) return {};
+  const bool sticks = speed <= law.static_friction * push;
+  const double hold = law.kinetic_friction * push;
+  const double part = sticks || hold > speed ? 1.0 : hold / speed;
+  return -part * slip;
+}
+
 /// The change of velocity that brings a point at a distance g < 0 from an obstacle onto its surface
 /// at the end of the step,
 ///
@@ -46,10 +66,7 @@ struct ContactChange {
 /// @param gap with a negative distance. @param dt size of the step [s]
 PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point,
                                        const ContactLaw& law, double dt) {
-  const auto freed = [&](Vec3<double> v) {
-    return Vec3<double>{v.x * point.free.x, v.y * point.free.y, v.z * point.free.z};
-  };
-  const Vec3<double> n = gap.normal, way = freed(n);
+  const Vec3<double> n = gap.normal, way = freed(point.free, n);
   const double share = dot(way, n);  // of the obstacle's push that the free axes feel
   if (!(share > 1e-6)) return {};
   double rate = -gap.distance / dt;
@@ -61,14 +78,7 @@ PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point
   const double push = rate / share;  // force times Δt/m
   ContactChange change{push * way, {}};
   if (!(law.static_friction > 0)) return change;
-  const Vec3<double> after = point.velocity + change.normal;
-  const Vec3<double> slip = freed(after - dot(after, n) * n);
-  const double speed = std::sqrt(dot(slip, slip));
-  if (!(speed > 0)) return change;
-  const bool sticks = speed <= law.static_friction * push;
-  const double hold = law.kinetic_friction * push;
-  const double part = sticks || hold > speed ? 1.0 : hold / speed;
-  change.tangential = -part * slip;
+  change.tangential = friction_change(point.velocity + change.normal, n, point.free, push, law);
   return change;
 }
 

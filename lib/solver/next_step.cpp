@@ -1,0 +1,91 @@
+#include "solver/next_step.hpp"
+
+#include <utility>
+
+#include "model/parts.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "solver/body_contacts.hpp"
+#include "solver/boundary_conditions.hpp"
+#include "solver/contact_stiffness.hpp"
+#include "solver/step_contacts.hpp"
+
+namespace phyxel {
+namespace {
+
+/// The state of some phyxels after a step in which nothing touches them.
+State next_state(const Model& model, const SupportInstant& now, const State& state,
+                 std::span<const Index> phyxels) {
+  const std::vector<Vec3d> free = free_axes(model);
+  State next{.displacement = state.displacement, .velocity = state.velocity};
+  for (const Index i : phyxels) {
+    const DampedFlow flow = damped_flow(part_of(model, i).material.damping, now.dt);
+    Vec3d& v = next.velocity[i];
+    v = flow.keep * v + (flow.gain / model.mass[i]) * now.other_force[i];
+    if (!free.empty()) v = by_components(free[i], v);
+    next.displacement[i] += now.dt * v;
+  }
+  if (free.empty()) return next;
+  std::vector<Vec3d> prescribed = next.displacement;
+  prescribe_displacements(model, now.time + now.dt, prescribed);
+  for (const Index i : phyxels) {
+    const Vec3d way = prescribed[i] - state.displacement[i];
+    next.velocity[i] += (1 / now.dt) * (way - by_components(free[i], way));
+    next.displacement[i] = prescribed[i];
+  }
+  return next;
+}
+
+}  // namespace
+
+NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
+                   const State& state) {
+  StepContacts contacts(model, 1);
+  BodyContacts bodies(model, 1);
+  const std::vector<Index>& layer =
+      bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
+  State next = next_state(model, now, state, layer);
+  NextStep made;
+  contacts.put_rigid(state.rigid, now.dt);
+  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
+  contacts.push(
+      [&](Index i) {
+        return Touched{state.displacement[i], state.velocity[i]};
+      },
+      [](Index, const Touched&) {});  // known in other forces
+  if (bodies.acts()) {
+    const auto of = [](const State& s) {
+      return [&s](Index i) { return SurfaceState{s.displacement[i], s.velocity[i]}; };
+    };
+    bodies.begin_step(now.dt, of(state));
+    std::vector<Mat3d> gradient;
+    if (bodies.any()) backend.displacement_gradients(gradient);
+    for (std::size_t p = 0; p < bodies.count(); ++p) {
+      bodies.set_gradient(p, gradient[bodies.phyxel(p)]);
+    }
+    made.depths = bodies.depths(of(state));
+    bodies.push_apart(of(state), [](Index, const SurfaceState&) {});  // known in other forces
+    bodies.keep_apart(of(next), [&](Index i, const SurfaceState& to) {
+      next.displacement[i] = to.displacement;
+      next.velocity[i] = to.velocity;
+    });
+    made.of_bodies.resize(static_cast<std::size_t>(model.size()));
+    bodies.for_each_force([&](Index i, Vec3d force) { made.of_bodies[i] += force; });
+    // Penalties are among the forces of the instant.
+    if (has_body_penalties(model)) {
+      bodies.for_each_push([&](Index i, Vec3d force) { made.of_bodies[i] -= force; });
+    }
+  }
+  contacts.keep_out([](Index) { return true; },
+                    [&](Index i) {
+                      return Touched{next.displacement[i], next.velocity[i]};
+                    },
+                    [&](Index i, const Touched& to) {
+                      next.displacement[i] = to.displacement;
+                      next.velocity[i] = to.velocity;
+                    });
+  made.sums = contacts.sums();
+  made.sums.insert(made.sums.end(), bodies.sums().begin(), bodies.sums().end());
+  return made;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,27 @@
+/// What bodies and obstacles do in the next of Verlet's steps, without taking it.
+#pragma once
+
+#include <vector>
+
+#include "phyxel/backend.hpp"
+#include "phyxel/model.hpp"
+#include "solver/step_sums.hpp"
+
+namespace phyxel {
+
+/// What bodies and obstacles do over the step from an instant, on this rank.
+struct NextStep {
+  StepSums sums;               ///< As `StepContacts` and `BodyContacts` would add them.
+  std::vector<double> depths;  ///< Now, of the deepest phyxel of each body in other bodies [m].
+  /// Forces of other bodies on phyxels of this rank that the forces of the instant do not contain
+  /// [N], shape [n]; empty if bodies do not touch each other. Those on held phyxels change no
+  /// motion, and their supports bear them.
+  std::vector<Vec3d> of_bodies;
+};
+
+/// Finds it from the present state. Of a share: collective.
+/// @param now instant of `PresentForces`. @param state the present state
+NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
+                   const State& state);
+
+}  // namespace phyxel
