@@ -5,11 +5,10 @@
 #include <algorithm>
 #include <optional>
 
+#include "drawn_obstacles.hpp"
 #include "files/atomic_file.hpp"
-#include "model/contact.hpp"
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
-#include "scene/parse_obstacles.hpp"
 #include "terminal.hpp"
 
 namespace phyxel::app {
@@ -26,32 +25,27 @@ std::string scene_text(const fs::path& file) {
   }
 }
 
-/// What a scene's text says, as `parse` reads it; `otherwise` if it cannot be parsed.
-template <class Parse, class Said>
-Said said(const std::string& scene, const fs::path& file, const Parse& parse, Said otherwise) {
+/// The wishes for pictures in a scene's text; the defaults if it cannot be parsed.
+RenderRequest wishes_in(const std::string& scene, const fs::path& file) {
   try {
-    return parse(scene, file);
+    return parse_render(scene, file);
   } catch (const InputError&) {
-    return otherwise;  // the frame has no scene text, or one of another version
+    return {};  // the frame has no scene text, or one of another version
   }
 }
 
-/// The obstacles of a scene, but for those whose meshes are gone. An equilibrium has them at the
-/// ends of their paths.
-std::vector<Obstacle> obstacles_in(Scene scene) {
-  std::erase_if(scene.obstacles, [](const ObstacleRequest& obstacle) {
-    if (obstacle.mesh.empty() || fs::exists(obstacle.mesh)) return false;
-    fmt::print(
-        stderr,
-        "phyxel: {}obstacle \"{}\" is not in the pictures: there is no {}; --scene-folder names "
-        "the scene's folder\n",
-        warning_word(), obstacle.name, obstacle.mesh.string());
-    return true;
-  });
-  std::vector<Obstacle> obstacles = obstacles_of(scene);
-  if (scene.solver.method != Method::equilibrium) return obstacles;
-  for (Obstacle& obstacle : obstacles) obstacle.motion.duration = 0;
-  return obstacles;
+/// The obstacles of a scene; a warning names those whose meshes are gone.
+std::vector<Obstacle> obstacles_in(const std::string& scene, const fs::path& folder) {
+  DrawnObstacles drawn =
+      drawn_obstacles(scene, folder / "scene.toml", [](const fs::path& mesh) -> std::string {
+        if (fs::exists(mesh)) return "";
+        return fmt::format("there is no {}; --scene-folder names the scene's folder",
+                           mesh.string());
+      });
+  for (const std::string& line : drawn.left_out) {
+    fmt::print(stderr, "phyxel: {}{}\n", warning_word(), line);
+  }
+  return std::move(drawn.obstacles);
 }
 
 /// Fits the camera to all frames, so that it sees the whole motion.
@@ -61,9 +55,8 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   const Shot& first = shots.front();
   const fs::path& start = first.surface.empty() ? first.phyxels : first.surface;
   const std::string scene = scene_text(start);
-  const RenderRequest asked = said(scene, start, parse_render, RenderRequest{});
-  setting.obstacles =
-      obstacles_in(said(scene, request.scene_folder / "scene.toml", parse_obstacles, Scene{}));
+  const RenderRequest asked = wishes_in(scene, start);
+  setting.obstacles = obstacles_in(scene, request.scene_folder);
   setting.up = request.up.value_or(asked.up);
   // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
   CameraFit fit(request.width, request.height, request.view.value_or(asked.view), setting.up);

@@ -6,12 +6,12 @@
 
 #include <cmath>
 #include <csignal>
-#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
 #include "report/page.hpp"
+#include "support/page.hpp"
 #include "support/program.hpp"
 #include "support/skips.hpp"
 
@@ -21,47 +21,16 @@ namespace {
 namespace fs = std::filesystem;
 using app::FramePlan;
 using nlohmann::json;
+using test::between;
+using test::data_of;
+using test::embedded;
 using test::Outcome;
+using test::seen_by_browser;
 using test::text_of;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-std::string between(const std::string& text, const std::string& begin, const std::string& end) {
-  const std::size_t from = text.find(begin);
-  EXPECT_NE(from, std::string::npos) << begin;
-  if (from == std::string::npos) return "";
-  const std::size_t start = from + begin.size();
-  return text.substr(start, text.find(end, start) - start);
-}
-
-/// Decodes base64.
-std::string decoded(const std::string& text) {
-  const std::string letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string bytes;
-  unsigned held = 0;
-  int bits = 0;
-  for (const char c : text) {
-    if (c == '=') break;
-    held = held << 6U | static_cast<unsigned>(letters.find(c));
-    bits += 6;
-    if (bits >= 8) bytes += static_cast<char>(held >> static_cast<unsigned>(bits -= 8) & 255U);
-  }
-  return bytes;
-}
-
-template <class T>
-std::vector<T> embedded(const std::string& page, const std::string& name) {
-  const std::string bytes = decoded(between(page, "id=\"" + name + "\">", "</script>"));
-  std::vector<T> values(bytes.size() / sizeof(T));
-  std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
-  return values;
-}
-
-json data_of(const std::string& page) {
-  return json::parse(between(page, "<script type=\"application/json\" id=\"data\">", "</script>"));
-}
 
 TEST(Page, Base64IsThatOfRfc4648) {
   const auto of = [](std::string_view text) {
@@ -144,17 +113,6 @@ region = "x-"
     const Outcome done = run(words);
     EXPECT_EQ(done.code, 0) << done.err;
     return text_of(folder_ / "page.html");
-  }
-  /// The element `<body ...>` of a page after Chromium has run its scripts.
-  std::string seen_by_browser(const fs::path& page) const {
-    const std::string command =
-        "HOME=" + folder_.string() +
-        " timeout 60 chromium --headless=new --no-sandbox --use-angle=swiftshader "
-        "--enable-unsafe-swiftshader --window-size=1000,800 --virtual-time-budget=4000 --dump-dom "
-        "file://" +
-        page.string() + " >" + (folder_ / "dom.html").string() + " 2>/dev/null";
-    EXPECT_EQ(std::system(command.c_str()), 0);
-    return between(text_of(folder_ / "dom.html"), "<body", ">");
   }
 };
 
@@ -336,7 +294,7 @@ TEST_F(Reports, ABrowserDrawsAReplay) {
   PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
   run_beam();
   page_of();
-  const std::string replay = seen_by_browser(folder_ / "page.html");
+  const std::string replay = seen_by_browser(folder_, "page.html");
   EXPECT_THAT(replay, HasSubstr("data-state=\"drawn\""));
   EXPECT_THAT(replay, HasSubstr("data-error=\"0\""));
   // The beam, seen whole, covers some of the stage, not all of it.

@@ -47,6 +47,7 @@ void report_command(const ReportOptions& options) {
                                   {"phyxels", report.phyxels},
                                   {"surfels", report.surfels},
                                   {"colours", report.fields},
+                                  {"obstacles", report.obstacles},
                                   {"notes", report.notes}}));
     return;
   }
@@ -59,9 +60,9 @@ void report_command(const ReportOptions& options) {
 }  // namespace
 
 void add_report(CLI::App& program) {
-  CLI::App* command = program.add_subcommand(
-      "report",
-      "Write an offline HTML page that replays a run in 3D, with its energies and timing");
+  CLI::App* command = program.add_subcommand("report",
+                                             "Write an offline HTML page that replays a run in 3D "
+                                             "with its obstacles, energies and timing");
   auto options = std::make_shared<ReportOptions>();
   command
       ->add_option("input", options->input, "Folder of a run, a .series file, or one frame (.hdf)")

@@ -62,37 +62,49 @@ bool lies_in(const fs::path& file, const fs::path& folder) {
   return !error && !inside.empty() && *inside.begin() != "..";
 }
 
-/// True if the scene's file exists and is equal to the frame's scene.
-bool is_users_own(const Scene& scene) {
+/// True if the scene's file exists with the same text.
+bool is_users_own(const fs::path& file, const std::string& text) {
   std::error_code ignored;
-  if (!fs::is_regular_file(scene.file, ignored)) return false;
+  if (!fs::is_regular_file(file, ignored)) return false;
   try {
-    return read_text_file(scene.file, largest_scene) == scene.text;
+    return read_text_file(file, largest_scene) == text;
   } catch (const InputError&) {
     return false;
   }
 }
 
+/// A scene without what its bodies touch, on which strains and stresses do not depend.
+Scene without_contact(Scene scene) {
+  scene.contact.reset();
+  scene.obstacles.clear();
+  return scene;
+}
+
 }  // namespace
+
+std::string obstacle_to_reading(const fs::path& file, const fs::path& scene,
+                                const std::string& text, const fs::path& folder) {
+  std::error_code ignored;
+  if (!lies_in(file, folder) && !is_users_own(scene, text)) {
+    return fmt::format(
+        "it names {}, which is outside the run's folder, and {} does not exist with the same text",
+        file.string(), scene.string());
+  }
+  if (!fs::is_regular_file(file, ignored)) {
+    return fmt::format("{} is not a regular file", file.string());
+  }
+  return "";
+}
 
 std::string obstacle_to_building(const Scene& scene, std::size_t phyxels, double spacing,
                                  const fs::path& folder) {
-  const bool own = is_users_own(scene);
   const auto most = 1.5 * static_cast<double>(phyxels) + 1000;
   double all = 0, pairs = 0, relaxed = 0;
   for (const BodyRequest& body : scene.bodies) {
     for (const fs::path& file : {body.source.mesh, body.source.file}) {
-      std::error_code ignored;
       if (file.empty()) continue;
-      if (!own && !lies_in(file, folder)) {
-        return fmt::format(
-            "it names {}, which is outside the run's folder, and {} does not exist with the same "
-            "text",
-            file.string(), scene.file.string());
-      }
-      if (!fs::is_regular_file(file, ignored)) {
-        return fmt::format("{} is not a regular file", file.string());
-      }
+      const std::string why = obstacle_to_reading(file, scene.file, scene.text, folder);
+      if (!why.empty()) return why;
     }
     const double some = phyxels_of(body.source);
     const double apart = body.source.shape.spacing > 0 ? body.source.shape.spacing : spacing;
@@ -116,7 +128,7 @@ std::string obstacle_to_building(const Scene& scene, std::size_t phyxels, double
 }
 
 Rebuilt::Rebuilt(Scene scene, std::size_t phyxels)
-    : scene_(std::move(scene)), model_(build_model(scene_)) {
+    : scene_(without_contact(std::move(scene))), model_(build_model(scene_)) {
   if (static_cast<std::size_t>(model_.size()) != phyxels) {
     throw InputError(fmt::format("it has {} phyxels now, the frames {}", model_.size(), phyxels));
   }

@@ -21,6 +21,12 @@ struct Field {
   std::vector<double> values;
 };
 
+/// The reason why a file that the scene in a frame names must not be read; "" if it may: it lies in
+/// the run's folder, or the file `scene` still exists with the same text.
+std::string obstacle_to_reading(const std::filesystem::path& file,
+                                const std::filesystem::path& scene, const std::string& text,
+                                const std::filesystem::path& folder);
+
 /// The reason why the scene in a frame must not be rebuilt; "" if it may. Frames may come from an
 /// untrusted source, so rebuilding is limited by the run's files: about as many phyxels as the
 /// frames have, with a bounded number of neighbours, and no file outside the run's folder unless

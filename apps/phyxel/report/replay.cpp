@@ -11,6 +11,7 @@
 #include "report/page.hpp"
 #include "report/rebuilt.hpp"
 #include "report/replay_data.hpp"
+#include "report/replay_obstacles.hpp"
 #include "report/report.hpp"
 #include "report/run_files.hpp"
 #include "scene/upright.hpp"
@@ -55,6 +56,7 @@ class Replay {
     first_surface_ = read(trajectory_.shots.front().surface, {});
     first_phyxels_ = read(trajectory_.shots.front().phyxels, {});
     rebuild();
+    find_obstacles();
   }
 
   Report report() {
@@ -65,6 +67,7 @@ class Replay {
     report.surfels = instances.front().surfels.size();
     report.phyxels = instances.front().phyxels.size();
     report.fields = field_names_;
+    for (const Obstacle& obstacle : obstacles_) report.obstacles.push_back(obstacle.name);
     report.notes = notes_;
     report.html = page(instances);
     return report;
@@ -139,6 +142,20 @@ class Replay {
     }
   }
 
+  /// Reads the obstacles of the frames' scene.
+  void find_obstacles() {
+    const fs::path scene = run_.scene_file();
+    try {
+      DrawnObstacles drawn = drawn_obstacles(any().scene, scene, [&](const fs::path& mesh) {
+        return obstacle_to_reading(mesh, scene, any().scene, folder_);
+      });
+      obstacles_ = std::move(drawn.obstacles);
+      for (const std::string& line : drawn.left_out) notes_.push_back("The " + line + ".");
+    } catch (const InputError& error) {
+      notes_.push_back(fmt::format("Obstacles are left out: {}", error.what()));
+    }
+  }
+
   /// Chooses the frames and the phyxels that are shown.
   void choose() {
     for (const Field& field : fields_of(any())) {
@@ -151,7 +168,8 @@ class Replay {
     constexpr double as_text = 4.0 / 3;
     const std::size_t all = trajectory_.shots.size();
     const double fields = static_cast<double>(field_names_.size());
-    const double once = static_cast<double>(12 * triangles + 5 * Carriers::each * surfels);
+    const double once = static_cast<double>(12 * triangles + 5 * Carriers::each * surfels) +
+                        embedded_size(obstacles_);
     const FramePlan plan =
         plan_frames(all, as_text * static_cast<double>(surfels) * (6 + (phyxels ? 0 : 2 * fields)),
                     as_text * static_cast<double>(phyxels) * (6 + 2 * fields),
@@ -272,6 +290,11 @@ class Replay {
       embed("carriers", carriers.phyxel);
       embed("weights", carriers.weight);
     }
+    for (std::size_t k = 0; k < obstacles_.size(); ++k) {
+      if (!obstacles_[k].surface) continue;
+      embed(fmt::format("obstacle{}", k), scaled_vertices(*obstacles_[k].surface, extent));
+      embed(fmt::format("obstacle{}-triangles", k), obstacles_[k].surface->triangle);
+    }
     return elements;
   }
 
@@ -296,14 +319,13 @@ class Replay {
       data["scale"].push_back(side.width() / Span::steps / radius);
       data["low"].push_back(-side.width() / 2 / radius);
     }
-    const auto from_centre = [](double at, const Span& side, double unit) {
-      return (at - side.low - side.width() / 2) / unit;
-    };
     for (const Vec3d p : outermost.points()) {
-      data["outermost"].push_back({from_centre(p.x, box[0], radius),
-                                   from_centre(p.y, box[1], radius),
-                                   from_centre(p.z, box[2], radius)});
+      const Vec3d centred = (1 / radius) * (p - extent.centre());
+      data["outermost"].push_back({centred.x, centred.y, centred.z});
     }
+    std::vector<double> times;
+    for (const Instance& instance : instances) times.push_back(instance.time);
+    data["obstacles"] = obstacles_json(obstacles_, times, extent);
     data["spacing"] = spacing / radius;
     data["carriers"] = Carriers::each;
     const auto axes = upright_axes(pictures_.up);
@@ -335,6 +357,7 @@ class Replay {
   std::optional<Scene> scene_;
   RenderRequest pictures_;
   std::optional<Rebuilt> rebuilt_;
+  std::vector<Obstacle> obstacles_;
   std::vector<std::size_t> chosen_;
   std::size_t stride_ = 1;
   std::vector<std::string> field_names_, field_units_, notes_;

@@ -63,6 +63,12 @@ struct Extent {
   Outermost outermost;       ///< Points on the outside.
   std::vector<Span> ranges;  ///< Range of each field.
   double radius = 0;         ///< Half the diagonal of the box [m].
+
+  /// Centre of the box [m].
+  Vec3d centre() const {
+    const auto middle = [](const Span& side) { return side.low + side.width() / 2; };
+    return {middle(box[0]), middle(box[1]), middle(box[2])};
+  }
 };
 Extent extent_of(const std::vector<Instance>& instances);
 

@@ -19,6 +19,7 @@ struct Report {
   std::string html;
   std::size_t frames = 0, phyxels = 0, surfels = 0;  ///< Numbers that the page shows.
   std::vector<std::string> fields;                   ///< Names of the fields that colours can show.
+  std::vector<std::string> obstacles;                ///< Names of the obstacles that are drawn.
   std::vector<std::string> notes;                    ///< What was left out, with reasons.
 };
 

@@ -90,8 +90,8 @@ function rampColour(t) {
 
 // --- drawing -------------------------------------------------------------------------------------
 const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
-const view = {};
-const shown = {frame: 0, field: data.fields.length ? 0 : -1, surface: data.surfels > 0, phyxels: data.surfels === 0, range: 'bulk'};
+const view = {}, fromTheRight = [0.398, 0.697, 0.597];  // the light of a page without obstacles
+const shown = {frame: 0, field: data.fields.length ? 0 : -1, surface: data.surfels > 0, phyxels: data.surfels === 0, obstacles: obstacles.length > 0, range: 'bulk'};
 let programs = null, buffers = null;
 
 function compile(vertex, fragment) {
@@ -107,46 +107,58 @@ function compile(vertex, fragment) {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   const at = {};
-  for (const name of ['scale', 'low', 'turn', 'eye', 'lens', 'range', 'plain', 'ball']) at[name] = gl.getUniformLocation(program, name);
+  for (const name of ['scale', 'low', 'turn', 'pose', 'eye', 'lens', 'range', 'plain', 'ball', 'parallel', 'towards', 'fade', 'ghost', 'pass', 'shade', 'depths',
+                      'lightRows', 'shaded']) at[name] = gl.getUniformLocation(program, name);
   return {program, at};
 }
 
 const place = `
 in vec3 point; in float field;
-uniform vec3 scale, low, eye; uniform mat3 turn; uniform vec4 lens; uniform vec2 range;
-out float value; out vec3 seen;
+uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel; uniform vec2 range;
+out float value; out vec3 seen, around;
 void put() {
-  seen = turn * (point * scale + low) - eye;  // looking along -z
-  gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, -seen.z);
+  around = pose * (point * scale) + low;
+  seen = turn * around - eye;  // looking along -z
+  gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, mix(-seen.z, 1.0, parallel));  // parallel: of a light far away
   value = (field - range.x) / max(range.y - range.x, 1e-6);
 }`;
 
 function prepare() {
-  const surface = compile(place + `
-in vec4 normal; out vec3 facing;
-void main() { put(); facing = turn * normal.xyz; }`, ramp + `
-in float value; in vec3 seen; in vec3 facing; uniform vec3 plain; out vec4 colour;
+  const placeOfSurface = place + `
+in vec4 normal; out vec3 facing, upright;
+void main() { put(); upright = pose * normal.xyz; facing = turn * upright; }`;
+  const surface = compile(placeOfSurface, ramp + shadows + `
+in float value; in vec3 seen, facing, around, upright; uniform vec3 plain, towards; out vec4 colour;
 void main() {
-  vec3 n = normalize(facing), v = normalize(-seen);
-  if (dot(n, v) < 0.0) n = -n;
+  vec3 n = normalize(facing), v = normalize(-seen), out_ = normalize(upright);
+  if (dot(n, v) < 0.0) { n = -n; out_ = -out_; }
   vec3 base = plain.x < 0.0 ? ramp(value) : plain;
-  float light = 0.35 + 0.55 * max(0.0, dot(n, normalize(vec3(0.4, 0.7, 0.6)))) + 0.12 * max(0.0, dot(n, v));
-  float shine = 0.18 * pow(max(0.0, dot(reflect(-v, n), normalize(vec3(0.4, 0.7, 0.6)))), 24.0);
+  float open = lightAt(around, out_, 0.012);
+  float light = 0.35 + 0.55 * open * max(0.0, dot(n, towards)) + 0.12 * max(0.0, dot(n, v)) + 0.14 * (1.0 - open) * (1.0 + dot(n, towards));
+  float shine = 0.18 * open * pow(max(0.0, dot(reflect(-v, n), towards)), 24.0);
   colour = vec4(base * light + shine, 1.0);
 }`);
-  const balls = compile(place + `
+  const placeOfBall = place + `
 uniform float ball;
-void main() { put(); gl_PointSize = clamp(ball / max(-seen.z, 1e-9), 2.0, 200.0); }`, ramp + `
-in float value; in vec3 seen; uniform vec3 plain; out vec4 colour;
-void main() {
+void main() { put(); gl_PointSize = clamp(ball / gl_Position.w, 2.0, 200.0); }`;
+  const round = `
   vec2 p = 2.0 * gl_PointCoord - 1.0;
   float rest = 1.0 - dot(p, p);
-  if (rest < 0.0) discard;
+  if (rest < 0.0) discard;`;
+  const balls = compile(placeOfBall, ramp + `
+in float value; in vec3 seen; uniform vec3 plain, towards; out vec4 colour;
+void main() {${round}
   vec3 n = vec3(p.x, -p.y, sqrt(rest));
   vec3 base = plain.x < 0.0 ? ramp(value) : plain;
-  colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, normalize(vec3(0.4, 0.7, 0.6))))), 1.0);
+  colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, towards))), 1.0);
 }`);
   programs = {surface, balls};
+  if (obstacles.length) {
+    programs.obstacle = compile(placeOfSurface, shadows + obstacleColour);
+    programs.casting = compile(placeOfSurface, 'void main() {}');
+    programs.castingBalls = compile(placeOfBall, `void main() {${round}\n}`);
+    prepareScenery();
+  }
   buffers = {surfels: [0, 1, 2].map(() => gl.createBuffer()), phyxels: [0, 1].map(() => gl.createBuffer()), triangles: gl.createBuffer()};
   if (triangles) {
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
@@ -220,49 +232,69 @@ function draw() {
   const ratio = Math.min(2, window.devicePixelRatio || 1);
   const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
   if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
-  gl.viewport(0, 0, width, height);
-  gl.clearColor(0, 0, 0, 0);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  gl.enable(gl.DEPTH_TEST);
   upload(frame);
-  const aspect = width / height;
-  const distance = view.distance * distanceForAll(aspect);
-  const near = Math.max(0.01, distance - 2.5), far = distance + 2.5;
-  const rows = matrix(view), turn = [];
-  for (let c = 0; c < 3; ++c) for (let r = 0; r < 3; ++r) turn.push(rows[r][c]);
+  gl.enable(gl.DEPTH_TEST);
+  const aspect = width / height, distance = view.distance * distanceForAll(aspect);
+  const scene = shown.obstacles;
+  const near = scene ? 0.02 * distance : Math.max(0.01, distance - 2.5), far = distance + (scene ? fade[1] + 1 : 2.5);
+  const rows = matrix(view), turn = columns(rows.flat());
   const spread = field ? Math.max(field.high - field.low, 1e-300) : 1;
-  const use = ({program, at}) => {
+  const eye = {turn, eye: [view.shift[0], view.shift[1], distance], lens: [focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
+  const use = (seenFrom, {program, at}) => {
     gl.useProgram(program);
-    gl.uniform3fv(at.scale, data.scale.map(s => 65535 * s));
+    gl.uniformMatrix3fv(at.pose, false, [1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    gl.uniform3fv(at.scale, sides);
     gl.uniform3fv(at.low, data.low);
-    gl.uniformMatrix3fv(at.turn, false, turn);
-    gl.uniform3f(at.eye, view.shift[0], view.shift[1], distance);
-    gl.uniform4f(at.lens, focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near));
+    gl.uniformMatrix3fv(at.turn, false, seenFrom.turn);
+    gl.uniform3fv(at.eye, seenFrom.eye);
+    gl.uniform4fv(at.lens, seenFrom.lens.slice(0, 4));
+    gl.uniform1f(at.parallel, seenFrom.lens[4]);
     gl.uniform2f(at.range, field ? (low - field.low) / spread : 0, field ? (high - field.low) / spread : 1);
+    gl.uniform3fv(at.towards, scene ? rows.map(row => row[0] * light.towards[0] + row[1] * light.towards[1] + row[2] * light.towards[2]) : fromTheRight);
+    return at;
   };
   const attribute = (k, buffer, size, type, normalised) => {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.enableVertexAttribArray(k);
     gl.vertexAttribPointer(k, size, type, normalised, 0, 0);
   };
-  if (shown.surface && frame.surfels) {
-    use(programs.surface);
-    gl.uniform3fv(programs.surface.at.plain, field ? [-1, 0, 0] : [0.36, 0.56, 0.76]);
+  const drawSurface = () => {
     attribute(0, buffers.surfels[0], 3, gl.UNSIGNED_SHORT, true);
     attribute(1, buffers.surfels[1], 1, gl.UNSIGNED_SHORT, true);
     attribute(2, buffers.surfels[2], 4, gl.BYTE, true);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
     gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
-  }
-  if (shown.phyxels && frame.phyxels) {
-    use(programs.balls);
+  };
+  const drawBalls = (at, size) => {
     gl.disableVertexAttribArray(2);
-    gl.uniform3fv(programs.balls.at.plain, field ? [-1, 0, 0] : [0.82, 0.42, 0.32]);
-    gl.uniform1f(programs.balls.at.ball, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
+    gl.uniform1f(at.ball, size);
     attribute(0, buffers.phyxels[0], 3, gl.UNSIGNED_SHORT, true);
     attribute(1, buffers.phyxels[1], 1, gl.UNSIGNED_SHORT, true);
     gl.drawArrays(gl.POINTS, 0, data.phyxels);
+  };
+  const surface = shown.surface && frame.surfels, balls = shown.phyxels && frame.phyxels;
+  if (scene) {
+    const lightEye = {turn: columns(light.rows.flat()), eye: [0, 0, 0], lens: [1 / lit, 1 / lit, -1 / lightDepth, 0, 1]};
+    drawShadows(frame.number, program => use(lightEye, program), () => {
+      if (surface) { use(lightEye, programs.casting); drawSurface(); }
+      else if (balls) drawBalls(use(lightEye, programs.castingBalls), data.spacing * 0.7 * texels / 2 / lit);
+    });
   }
+  gl.viewport(0, 0, width, height);
+  gl.clearColor(0, 0, 0, 0);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  if (surface) {
+    const at = use(eye, programs.surface);
+    bindShadows(at, scene);
+    gl.uniform3fv(at.plain, field ? [-1, 0, 0] : [0.36, 0.56, 0.76]);
+    drawSurface();
+  }
+  if (balls) {
+    const at = use(eye, programs.balls);
+    gl.uniform3fv(at.plain, field ? [-1, 0, 0] : [0.82, 0.42, 0.32]);
+    drawBalls(at, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
+  }
+  if (scene) drawObstacles(frame.number, program => { const at = use(eye, program); bindShadows(at, true); return at; });
 }
 
 // --- charts --------------------------------------------------------------------------------------
@@ -329,11 +361,12 @@ function control() {
   field.addEventListener('change', () => { shown.field = Number(field.value); draw(); });
   const range = document.getElementById('range');
   range.addEventListener('change', () => { shown.range = range.value; draw(); });
-  for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels]]) {
+  for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels], ['obstacles', obstacles.length]]) {
     const box = document.getElementById(name);
     box.checked = shown[name]; box.disabled = !count;
     box.addEventListener('change', () => { shown[name] = box.checked; draw(); });
   }
+  document.getElementById('with-obstacles').hidden = !obstacles.length;
   document.getElementById('reset').addEventListener('click', () => { startView(); draw(); });
   const pointers = new Map();
   canvas.addEventListener('pointerdown', event => { canvas.setPointerCapture(event.pointerId); pointers.set(event.pointerId, event); });
@@ -389,6 +422,7 @@ function tell(state) {
   let drawn = 0;
   for (let k = 3; k < pixels.length; k += 4) if (pixels[k]) ++drawn;
   document.body.dataset.drawn = (drawn / (canvas.width * canvas.height)).toFixed(4);
+  document.body.dataset.obstacles = scenery.parts.length;
   document.body.dataset.error = gl.getError();
 }
 

@@ -1,0 +1,28 @@
+/// The obstacles of a replay as its page stores them.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "drawn_obstacles.hpp"
+#include "report/replay_data.hpp"
+
+namespace phyxel::app {
+
+/// Shapes, lengths and places of obstacles, in units of the radius of `extent`, about its centre.
+/// A place is a rotation, row by row, and a translation; there is one for each time, or a single
+/// one of an obstacle at rest. The surface of a mesh is in the elements `obstacle<k>` (vertices,
+/// float) and `obstacle<k>-triangles`.
+/// @param times of the frames [s]
+nlohmann::ordered_json obstacles_json(const std::vector<Obstacle>& obstacles,
+                                      std::span<const double> times, const Extent& extent);
+
+/// Size of the elements with surfaces of obstacles [bytes].
+double embedded_size(const std::vector<Obstacle>& obstacles);
+
+/// The vertices of an obstacle's mesh in its own coordinates, in units of the radius of `extent`.
+std::vector<float> scaled_vertices(const Surface& surface, const Extent& extent);
+
+}  // namespace phyxel::app
