@@ -86,7 +86,7 @@ void include_obstacle(ShadowBounds& bounds, const PlacedObstacle& obstacle, Vec3
 /// Adds the obstacles at the time of the bodies, and shadows, to a picture of the bodies.
 void add_obstacles(Rasteriser& rasteriser, const Bodies& bodies, const Setting& setting) {
   constexpr Colour black{0, 0, 0};
-  const std::vector<PlacedObstacle> all = placed(setting.obstacles, bodies.time());
+  const std::vector<PlacedObstacle> all = placed(setting.obstacles, setting.paths, bodies.time());
   const Fade fade{setting.middle, 1.0 * setting.extent, 4.0 * setting.extent};
   const Vec3d light = light_direction(setting.camera, setting.up);
   ShadowBounds bounds(setting.camera, light);

@@ -5,6 +5,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
 #include "rasteriser.hpp"
+#include "rigid_paths.hpp"
 
 namespace phyxel::app {
 
@@ -17,6 +18,7 @@ struct Setting {
   int time_decimals = 2;                 ///< Decimals of the time label; negative for no label.
   Vec3d middle;                          ///< Of the visible points [m].
   std::vector<Obstacle> obstacles = {};  ///< Drawn where they are at the time of a frame.
+  RigidPaths paths = {};                 ///< Of those that are free bodies.
 };
 
 /// Median distance to the nearest point [m], of a few points distributed over the list; 0 for fewer

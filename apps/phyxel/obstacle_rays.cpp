@@ -24,10 +24,11 @@ double PlacedObstacle::distance(Vec3d x) const {
   return with_gap(*this, [&](const auto& gap) { return gap(x).distance; });
 }
 
-std::vector<PlacedObstacle> placed(const std::vector<Obstacle>& obstacles, double time) {
+std::vector<PlacedObstacle> placed(const std::vector<Obstacle>& obstacles, const RigidPaths& paths,
+                                   double time) {
   std::vector<PlacedObstacle> all;
   for (const Obstacle& obstacle : obstacles) {
-    all.push_back({obstacle.form, obstacle.step_from(time, 0), obstacle.is_bounded(),
+    all.push_back({obstacle.form, paths.at(obstacle, time), obstacle.is_bounded(),
                    static_cast<Index>(all.size())});
   }
   return all;

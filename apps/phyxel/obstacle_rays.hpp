@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "phyxel/model.hpp"
+#include "rigid_paths.hpp"
 
 namespace phyxel::app {
 
@@ -20,8 +21,9 @@ struct PlacedObstacle {
   double distance(Vec3d x) const;
 };
 
-/// The obstacles of a scene at a time [s].
-std::vector<PlacedObstacle> placed(const std::vector<Obstacle>& obstacles, double time);
+/// The obstacles of a scene at a time [s]. @param paths of those that are free bodies
+std::vector<PlacedObstacle> placed(const std::vector<Obstacle>& obstacles, const RigidPaths& paths,
+                                   double time);
 
 /// All rays from an eye near one of them.
 struct Cone {

@@ -57,6 +57,7 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   const std::string scene = scene_text(start);
   const RenderRequest asked = wishes_in(scene, start);
   setting.obstacles = obstacles_in(scene, request.scene_folder);
+  setting.paths = RigidPaths(start.parent_path());
   setting.up = request.up.value_or(asked.up);
   // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
   CameraFit fit(request.width, request.height, request.view.value_or(asked.view), setting.up);
@@ -64,6 +65,9 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
     for (const fs::path& file : {shot.surface, shot.phyxels}) {
       if (const auto frame = read_if_any(file)) fit.include(frame->point);
     }
+  }
+  for (const Obstacle& obstacle : setting.obstacles) {
+    for (const auto& [time, state] : setting.paths.of(obstacle)) fit.include(std::span(&state.place, 1));
   }
   if (fit.empty()) throw InputError("the frames have no point with finite coordinates");
   const auto phyxels = read_if_any(shots.front().phyxels);

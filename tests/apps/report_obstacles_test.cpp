@@ -62,7 +62,7 @@ TEST(ReplayObstacles, ThoseOfAllExamplesAreInTheirPlaces) {
     const Scene scene = read_scene(file);
     const auto drawn =
         app::drawn_obstacles(scene.text, file, [](const fs::path&) { return std::string(); });
-    const json all = app::obstacles_json(drawn.obstacles, times, extent);
+    const json all = app::obstacles_json(drawn.obstacles, {}, times, extent);
     ASSERT_EQ(all.size(), scene.obstacles.size()) << file;
     for (std::size_t k = 0; k < all.size(); ++k) {
       EXPECT_EQ(all[k]["name"], scene.obstacles[k].name);
@@ -72,7 +72,7 @@ TEST(ReplayObstacles, ThoseOfAllExamplesAreInTheirPlaces) {
         const Vec3d shown = placed_in(all[k], f, surface_point(all[k]));
         const Vec3d there = extent.radius * shown + extent.centre();
         // Rounding: eps times coordinates below 100 m, over a few operations.
-        EXPECT_NEAR(app::placed(drawn.obstacles, times[f])[k].distance(there), 0, 1e-12)
+        EXPECT_NEAR(app::placed(drawn.obstacles, {}, times[f])[k].distance(there), 0, 1e-12)
             << file << " " << all[k]["name"];
       }
     }

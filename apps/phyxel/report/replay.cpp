@@ -150,6 +150,7 @@ class Replay {
         return obstacle_to_reading(mesh, scene, any().scene, folder_);
       });
       obstacles_ = std::move(drawn.obstacles);
+      paths_ = RigidPaths(folder_);
       for (const std::string& line : drawn.left_out) notes_.push_back("The " + line + ".");
     } catch (const InputError& error) {
       notes_.push_back(fmt::format("Obstacles are left out: {}", error.what()));
@@ -325,7 +326,7 @@ class Replay {
     }
     std::vector<double> times;
     for (const Instance& instance : instances) times.push_back(instance.time);
-    data["obstacles"] = obstacles_json(obstacles_, times, extent);
+    data["obstacles"] = obstacles_json(obstacles_, paths_, times, extent);
     data["spacing"] = spacing / radius;
     data["carriers"] = Carriers::each;
     const auto axes = upright_axes(pictures_.up);
@@ -358,6 +359,7 @@ class Replay {
   RenderRequest pictures_;
   std::optional<Rebuilt> rebuilt_;
   std::vector<Obstacle> obstacles_;
+  RigidPaths paths_;  // of those that are free bodies
   std::vector<std::size_t> chosen_;
   std::size_t stride_ = 1;
   std::vector<std::string> field_names_, field_units_, notes_;

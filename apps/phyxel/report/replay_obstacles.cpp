@@ -7,9 +7,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-/// The rotation and the translation of an obstacle at a time [s].
-Json place_of(const Obstacle& obstacle, double time, const Extent& extent) {
-  const ObstacleStep step = obstacle.step_from(time, 0);
+/// The rotation and the translation of an obstacle.
+Json place_of(const ObstacleStep& step, const Extent& extent) {
   Json place = Json::array();
   for (int e = 0; e < 9; ++e) place.push_back(step.turn(e / 3, e % 3));
   const Vec3d centred = (1 / extent.radius) * (step.place - extent.centre());
@@ -19,8 +18,8 @@ Json place_of(const Obstacle& obstacle, double time, const Extent& extent) {
 
 }  // namespace
 
-Json obstacles_json(const std::vector<Obstacle>& obstacles, std::span<const double> times,
-                    const Extent& extent) {
+Json obstacles_json(const std::vector<Obstacle>& obstacles, const RigidPaths& paths,
+                    std::span<const double> times, const Extent& extent) {
   Json all = Json::array();
   for (const Obstacle& obstacle : obstacles) {
     Json one{{"name", obstacle.name}, {"hollow", obstacle.hollow}};
@@ -32,9 +31,9 @@ Json obstacles_json(const std::vector<Obstacle>& obstacles, std::span<const doub
       }
     });
     one["places"] = Json::array();
-    const bool rests = obstacle.motion.stands_still();
+    const bool rests = obstacle.stands_still();
     for (const double time : rests ? times.first(1) : times) {
-      one["places"].push_back(place_of(obstacle, time, extent));
+      one["places"].push_back(place_of(paths.at(obstacle, time), extent));
     }
     all.push_back(std::move(one));
   }

@@ -8,6 +8,7 @@
 
 #include "drawn_obstacles.hpp"
 #include "report/replay_data.hpp"
+#include "rigid_paths.hpp"
 
 namespace phyxel::app {
 
@@ -15,9 +16,10 @@ namespace phyxel::app {
 /// A place is a rotation, row by row, and a translation; there is one for each time, or a single
 /// one of an obstacle at rest. The surface of a mesh is in the elements `obstacle<k>` (vertices,
 /// float) and `obstacle<k>-triangles`.
-/// @param times of the frames [s]
+/// @param paths of those that are free bodies. @param times of the frames [s]
 nlohmann::ordered_json obstacles_json(const std::vector<Obstacle>& obstacles,
-                                      std::span<const double> times, const Extent& extent);
+                                      const RigidPaths& paths, std::span<const double> times,
+                                      const Extent& extent);
 
 /// Size of the elements with surfaces of obstacles [bytes].
 double embedded_size(const std::vector<Obstacle>& obstacles);
