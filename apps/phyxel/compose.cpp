@@ -39,6 +39,7 @@ class Bodies {
         radius_(0.42 * setting.spacing) {
     if (frame_ == nullptr) return;
     colour_ = colours(*frame_, body_colour);
+    if (setting.colouring) colour_by_field(surface, phyxels, *setting.colouring);
     if (surface != nullptr && surface->normal.size() != surface->point.size()) {
       made_normal_ = vertex_normals(surface->point, surface->triangle);
     }
@@ -62,6 +63,16 @@ class Bodies {
   }
 
  private:
+  /// Colours the points by a field. NaN has the colour of the lowest value.
+  void colour_by_field(const FrameData* surface, const FrameData* phyxels,
+                       const Colouring& colouring) {
+    const std::vector<double> values = shown_values(surface, phyxels, colouring);
+    if (values.size() != colour_.size()) return;
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      colour_[i] = field_colour(values[i], colouring);
+    }
+  }
+
   const FrameData *surface_, *frame_;
   double radius_;  // of phyxels without a surface [m]
   std::vector<Colour> colour_;
@@ -144,7 +155,7 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
     if (!setting.obstacles.empty()) add_obstacles(rasteriser, bodies, setting);
     rasteriser.shade_hollows(surface != nullptr ? 0.05 * setting.extent : 1.5 * setting.spacing);
   }
-  if (surface != nullptr && phyxels != nullptr) {
+  if (surface != nullptr && phyxels != nullptr && !setting.colouring) {
     DotStyle style;
     style.largest = 0.04 * std::min(setting.camera.width, setting.camera.height);
     style.radius = 0.20 * setting.spacing;
@@ -159,6 +170,7 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
     draw_text(image, margin, image.height - margin - static_cast<int>(7 * scale), scale,
               fmt::format("t = {:.{}f} s", bodies.time(), setting.time_decimals));
   }
+  if (bodies.any() && setting.colouring) draw_colour_bar(image, *setting.colouring);
   return image;
 }
 

@@ -2,6 +2,9 @@
 /// Farias et al. 2008.
 #pragma once
 
+#include <optional>
+
+#include "colouring.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
 #include "rasteriser.hpp"
@@ -19,6 +22,12 @@ struct Setting {
   Vec3d middle;                          ///< Of the visible points [m].
   std::vector<Obstacle> obstacles = {};  ///< Drawn where they are at the time of a frame.
   RigidPaths paths = {};                 ///< Of those that are free bodies.
+  double spacing = 0;                       ///< Typical distance between phyxels [m].
+  double extent = 0;                        ///< Extent of the visible points [m].
+  int time_decimals = 2;                    ///< Decimals of the time label; negative for no label.
+  Vec3d middle;                             ///< Of the visible points [m].
+  std::vector<Obstacle> obstacles = {};     ///< Drawn where they are at the time of a frame.
+  std::optional<Colouring> colouring = {};  ///< Unset: bodies have colours of their own.
 };
 
 /// Median distance to the nearest point [m], of a few points distributed over the list; 0 for fewer

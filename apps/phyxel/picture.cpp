@@ -1,14 +1,18 @@
 #include "picture.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <tuple>
 
 #include "drawn_obstacles.hpp"
 #include "files/atomic_file.hpp"
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
+#include "sort_unique.hpp"
 #include "terminal.hpp"
 
 namespace phyxel::app {
@@ -82,6 +86,50 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   return setting;
 }
 
+/// The colours that show a field of the frames.
+/// @throws InputError if the frames lack it
+Colouring colouring_of(const std::vector<Shot>& shots, const std::vector<std::size_t>& chosen,
+                       const PictureRequest& request, double spacing) {
+  Colouring colouring{.field = request.colour};
+  const auto surface = read_if_any(shots.front().surface, true),
+             phyxels = read_if_any(shots.front().phyxels, true);
+  if (surface && phyxels && !surface->point.empty() && !phyxels->point.empty()) {
+    colouring.carriers =
+        carriers_of(surface->point, phyxels->point, spacing > 0 ? 1.6 * spacing : 1);
+  }
+  const auto shown = [&](const std::optional<FrameData>& a, const std::optional<FrameData>& b) {
+    return shown_values(a ? &*a : nullptr, b ? &*b : nullptr, colouring);
+  };
+  if (shown(surface, phyxels).empty()) {
+    std::vector<std::string> names;
+    for (const auto& frame : {surface, phyxels}) {
+      if (!frame) continue;
+      for (const std::string& name : colour_fields(*frame)) names.push_back(name);
+    }
+    sort_unique(names);
+    throw InputError(fmt::format(
+        "--colour {}: the frames have no such number or vector; allowed: {}; "
+        "output.fields of the scene adds others",
+        request.colour, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
+  }
+  if (request.range) {
+    std::tie(colouring.low, colouring.high) = *request.range;
+    return colouring;
+  }
+  constexpr std::size_t most = 1'000'000;  // values of a sample
+  std::vector<double> sample;
+  for (const std::size_t k : chosen) {
+    const std::vector<double> values =
+        shown(read_if_any(shots[k].surface, true), read_if_any(shots[k].phyxels, true));
+    const std::size_t every = 1 + values.size() * chosen.size() / most;
+    for (std::size_t i = 0; i < values.size(); i += every) {
+      if (std::isfinite(values[i])) sample.push_back(values[i]);
+    }
+  }
+  std::tie(colouring.low, colouring.high) = bulk_of(std::move(sample));
+  return colouring;
+}
+
 bool is_picture_name(const std::string& name) {
   if (name.rfind("frame_", 0) != 0 || !name.ends_with(".png") || name.size() < 16) return false;
   const std::string number = name.substr(6, name.size() - 10);
@@ -100,11 +148,16 @@ std::vector<fs::path> render(const fs::path& input, const fs::path& folder,
                                                 : input.stem().string() + ".png"));
     check_output_file(files.back(), overwrite, Output::file);
   }
-  const Setting setting = set_stage(trajectory.shots, request);
+  Setting setting = set_stage(trajectory.shots, request);
+  if (!request.colour.empty()) {
+    setting.colouring = colouring_of(trajectory.shots, chosen, request, setting.spacing);
+  }
   make_writable_folder(folder);
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const Shot& shot = trajectory.shots[chosen[k]];
-    const auto surface = read_if_any(shot.surface), phyxels = read_if_any(shot.phyxels);
+    const bool fields = setting.colouring.has_value();
+    const auto surface = read_if_any(shot.surface, fields),
+               phyxels = read_if_any(shot.phyxels, fields);
     write_png(files[k],
               draw_picture(surface ? &*surface : nullptr, phyxels ? &*phyxels : nullptr, setting));
   }

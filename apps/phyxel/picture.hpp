@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "compose.hpp"
@@ -18,6 +19,9 @@ struct PictureRequest {
   std::optional<Vec3d> view, up;
   bool phyxels = true, surface = true;  ///< Families that are drawn, if they exist.
   FrameChoice choice;
+  std::string colour;  ///< Name of a field of the frames that colours show; "": bodies differ.
+  /// Range of the colours; unset: 98% of the values of the frames that are drawn.
+  std::optional<std::pair<double, double>> range = {};
   /// Folder of the scene, from which it names meshes; empty: the current one.
   std::filesystem::path scene_folder = {};
 };

@@ -1,5 +1,6 @@
 /// phyxel render: pictures of a trajectory.
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
@@ -17,7 +18,7 @@ constexpr std::int64_t most_frames = 1'000'000'000;
 struct RenderOptions {
   std::filesystem::path input, out;
   PictureRequest request;
-  std::vector<double> view, up;
+  std::vector<double> view, up, range;
   bool no_phyxels = false, no_surface = false, force = false, json = false;
 };
 
@@ -34,6 +35,15 @@ void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
   request.view = vector_of(options.view, "--view");
   request.up = vector_of(options.up, "--up");
+  if (!options.range.empty()) {
+    if (options.range.size() != 2 || !(options.range[0] < options.range[1])) {
+      throw InputError(
+          fmt::format("--range {}: allowed: two numbers, the lower one first, as in "
+                      "--range 0,5e4",
+                      fmt::join(options.range, ",")));
+    }
+    request.range = {options.range[0], options.range[1]};
+  }
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
   if (!request.phyxels && !request.surface) {
@@ -94,6 +104,15 @@ void add_render(CLI::App& program) {
                    "Vertical direction of the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
+  auto* colour = command->add_option(
+      "--colour,--color", request.colour,
+      "Field of the frames that colours show, with a bar: displacement, speed, von_mises, ...");
+  command
+      ->add_option("--range", options->range,
+                   "Range of the colours: low,high (default: 98% of the values of the pictures)")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->needs(colour);
   command->add_option("--scene-folder", request.scene_folder,
                       "Folder of the scene, with the meshes of its obstacles (default: the current "
                       "one)");
@@ -105,6 +124,7 @@ void add_render(CLI::App& program) {
       "Examples:\n"
       "  phyxel render out/dino --count 6\n"
       "  phyxel render out/dino --frames 0,10,-1 --view 0,1,0 --out pictures\n"
+      "  phyxel render out/dino --colour speed --range 0,2\n"
       "  phyxel render out/dino/surface_000010.hdf");
   command->callback([options] { render_command(*options); });
 }

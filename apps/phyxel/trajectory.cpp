@@ -81,9 +81,9 @@ Trajectory find_trajectory(const fs::path& input, Families wanted) {
   return trajectory;
 }
 
-std::optional<FrameData> read_if_any(const fs::path& file) {
+std::optional<FrameData> read_if_any(const fs::path& file, bool fields) {
   if (file.empty()) return std::nullopt;
-  return read_frame(file);
+  return read_frame(file, fields);
 }
 
 int time_decimals(const std::vector<Shot>& shots) {

@@ -29,8 +29,8 @@ struct Families {
 /// @throws InputError if there are no frames of the requested families
 Trajectory find_trajectory(const std::filesystem::path& input, Families wanted);
 
-/// The frame in a file; unset if the name is empty.
-std::optional<FrameData> read_if_any(const std::filesystem::path& file);
+/// The frame in a file; unset if the name is empty. @param fields true: with its fields
+std::optional<FrameData> read_if_any(const std::filesystem::path& file, bool fields = false);
 
 /// Number of decimals that distinguishes the frames' times, at least 2.
 int time_decimals(const std::vector<Shot>& shots);

@@ -191,10 +191,14 @@ void check_surfels(const Model& m) {
   check_rows("surfels.carriers", surfels.carriers, count, "surfels");
   check_indices("surfels.carriers.indices", surfels.carriers.indices, m.size());
   if (m.share) return;  // which has no triangles of its own
-  for (std::size_t t = 0; t < surfels.triangle.size(); ++t) {
-    check_indices(fmt::format("surfels.triangle[{}]", t), surfels.triangle[t],
-                  static_cast<Index>(count));
-  }
+  const auto triangles = static_cast<Offset>(surfels.triangle.size());
+  const Offset bad = first_bad(triangles, [&](Offset t) {
+    return std::ranges::any_of(surfels.triangle[static_cast<std::size_t>(t)],
+                               [&](Index s) { return s < 0 || s >= static_cast<Index>(count); });
+  });
+  if (bad == triangles) return;
+  check_indices(fmt::format("surfels.triangle[{}]", bad),
+                surfels.triangle[static_cast<std::size_t>(bad)], static_cast<Index>(count));
 }
 
 void check_boundary(const Model& m) {

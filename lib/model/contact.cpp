@@ -165,8 +165,9 @@ std::vector<double> distances_from_surface(std::span<const Vec3d> position,
           const double radius = std::max({norm(a - middle), norm(b - middle), norm(c - middle)});
           hash.visit_ball(middle, radius + reach, [&](const SpatialHash::Entry& entry) {
             const Vec3d x = entry.position;
-            if (norm(x - middle) > radius + reach) return;
             double& least = distance[entry.index];
+            // The triangle is no nearer than the ball around it.
+            if (norm(x - middle) - radius > std::min(reach, least)) return;
             least = std::min(least, norm(x - nearest_on_triangle(x, a, b, c)));
           });
         });

@@ -151,6 +151,13 @@ void check_damped(const Scene& scene, double damping) {
       *scene.time.step, damping, 1 / damping));
 }
 
+/// By how much the viscosity of a model's materials shortens its largest step; "" if by nothing.
+std::string viscosity_in_words(double viscosity, double omega) {
+  if (!(viscosity > 0)) return "";
+  return fmt::format("; body.material.viscosity = {:g} s shortens it to {:.3g} x 2 / omega_max",
+                     viscosity, viscous_step_share(viscosity, omega));
+}
+
 StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& backend,
                            bool unsafe_step) {
   StepPlan plan;
@@ -158,12 +165,14 @@ StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& back
   plan.shortens = !unsafe_step;
   plan.lengthens = plan.shortens && !scene.time.step;
   const double largest = plan.limit.largest_step;
+  const std::string viscous = viscosity_in_words(largest_viscosity(model), plan.limit.omega_max);
   if (scene.time.step && *scene.time.step >= largest && !unsafe_step) {
     throw InputError(fmt::format(
         "time.step = {:g} s is unstable: the largest stable step is {:g} s (2 / omega_max, "
-        "omega_max = {:g} rad/s); allowed below that, or \"adaptive\", or --unsafe-step to try it "
+        "omega_max = {:g} rad/s{}); allowed below that, or \"adaptive\", or --unsafe-step to try "
+        "it "
         "all the same",
-        *scene.time.step, largest, plan.limit.omega_max));
+        *scene.time.step, largest, plan.limit.omega_max, viscous));
   }
   const Resolution finest = finest_resolution(scene);
   const double damping = strongest_damping(model);
@@ -176,8 +185,8 @@ StepPlan plan_verlet_steps(const Scene& scene, const Model& model, Backend& back
                               : three_digits_below(std::min({stable, damped, finest.step})),
               plan);
   const std::string limit_words = fmt::format(
-      "largest stable {:.4g} s, from omega_max = {:.4g} rad/s found by {} Lanczos iterations",
-      largest, plan.limit.omega_max, plan.limit.iterations);
+      "largest stable {:.4g} s, from omega_max = {:.4g} rad/s found by {} Lanczos iterations{}",
+      largest, plan.limit.omega_max, plan.limit.iterations, viscous);
   if (scene.time.step) {
     plan.why = fmt::format("{:.6g} s, as the scene asks ({})", plan.dt, limit_words);
   } else if (finest.step < std::min(stable, damped)) {

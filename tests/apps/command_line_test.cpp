@@ -37,7 +37,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
       {{"run", "-V"}, "-V", "\"phyxel\" has --version"},
       {{"--verison"}, "--verison", "did you mean \"--version\""},
       {{"--colour"}, "--colour", "NO_COLOR=1 turns them off"},
-      {{"render", "out", "--color"}, "--color", "NO_COLOR=1 turns them off"},
+      {{"report", "out", "--color"}, "--color", "NO_COLOR=1 turns them off"},
       {{"run", "x.toml", "--ot", "a"}, "--ot", "did you mean \"--out\""},
       {{"run", "x.toml", "--ot=a"}, "--ot", "did you mean \"--out\""},
       {{"run", "x.toml", "--Until", "1"}, "--Until", "did you mean \"--until\""},

@@ -89,6 +89,18 @@ Extent extent_of(const std::vector<Instance>& instances) {
   return extent;
 }
 
+std::pair<double, double> bulk_of(std::vector<double> values) {
+  if (values.empty()) return {0, 1};
+  const auto at = [&](double share) {
+    const auto place = values.begin() +
+                       static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+    std::nth_element(values.begin(), place, values.end());
+    return *place;
+  };
+  const double low = at(0.01);
+  return {low, at(0.99)};
+}
+
 std::pair<double, double> bulk_of(const std::vector<Instance>& instances, std::size_t field) {
   std::size_t all = 0;
   for (const Instance& instance : instances) all += instance.fields[field].size();
@@ -100,15 +112,7 @@ std::pair<double, double> bulk_of(const std::vector<Instance>& instances, std::s
       if (k++ % every == 0 && std::isfinite(value)) sample.push_back(value);
     }
   }
-  if (sample.empty()) return {0, 1};
-  const auto at = [&](double share) {
-    const auto place = sample.begin() +
-                       static_cast<std::ptrdiff_t>(share * static_cast<double>(sample.size() - 1));
-    std::nth_element(sample.begin(), place, sample.end());
-    return *place;
-  };
-  const double low = at(0.01);
-  return {low, at(0.99)};
+  return bulk_of(std::move(sample));
 }
 
 std::vector<std::uint16_t> quantised(const Instance& instance, const Extent& extent) {

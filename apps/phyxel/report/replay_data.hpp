@@ -72,6 +72,9 @@ struct Extent {
 };
 Extent extent_of(const std::vector<Instance>& instances);
 
+/// The 1st and the 99th percentile of some values; 0 and 1 if there are none.
+std::pair<double, double> bulk_of(std::vector<double> values);
+
 /// The 1st and the 99th percentile of a field over all frames, from a sample.
 std::pair<double, double> bulk_of(const std::vector<Instance>& instances, std::size_t field);
 

@@ -1,4 +1,5 @@
 /// Kelvin–Voigt damping lowers the largest stable step.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -12,6 +13,8 @@ namespace phyxel {
 namespace {
 
 using namespace phyxel::testing;
+using ::testing::HasSubstr;
+using ::testing::Not;
 
 /// How far a mode of frequency ω goes that a relaxation time damps, in 4000 of Verlet's steps,
 /// where viscous forces follow from half-step velocities.
@@ -67,6 +70,11 @@ TEST(ViscousStep, IsThatOfAPlan) {
   // Three digits of 0.8 of the limit, cut so that the end falls on a whole step.
   EXPECT_LE(plan.dt, 0.8 * share * without.largest_step);
   EXPECT_GT(plan.dt, 0.78 * share * without.largest_step);
+  // The plan says by how much: √1.25 - 0.5 = 0.618.
+  EXPECT_THAT(plan.why, HasSubstr("viscosity"));
+  EXPECT_THAT(plan.why, HasSubstr("shortens it to 0.618 x 2 / omega_max"));
+  EXPECT_THAT(plan_steps(scene, elastic, *make_test_backend(elastic, Precision::double_, 1)).why,
+              Not(HasSubstr("viscosity")));
 }
 
 /// The viscosity of a stretched body grows as the stretch squared, though a linear law does not

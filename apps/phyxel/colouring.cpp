@@ -1,0 +1,136 @@
+#include "colouring.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "label.hpp"
+
+namespace phyxel::app {
+namespace {
+
+/// Components of a field at each point; 0 if it has a number of values that fits no point.
+std::size_t components(const FrameData& frame, const std::vector<double>& values) {
+  const std::size_t points = frame.point.size();
+  return points > 0 && values.size() % points == 0 ? values.size() / points : 0;
+}
+
+/// The name of a field in frames.
+std::string stored_name(const std::string& field) { return field == "speed" ? "velocity" : field; }
+
+/// The unit of a field; "" of a number without one.
+std::string unit_of(const std::string& field) {
+  struct Unit {
+    const char *field, *unit;
+  };
+  constexpr Unit units[] = {{"displacement", "m"}, {"velocity", "m/s"}, {"speed", "m/s"},
+                            {"von_mises", "Pa"},   {"mass", "kg"},      {"volume", "m^3"}};
+  for (const Unit& known : units) {
+    if (field == known.field) return known.unit;
+  }
+  return "";
+}
+
+/// Viridis in sRGB, by a polynomial of degree six: Zucker's fit, as on the page of a report.
+std::array<double, 3> viridis(double t) {
+  constexpr double c[3][7] = {
+      {0.2777273, 0.1050930, -0.3308618, -4.6342305, 6.2282699, 4.7763850, -5.4354559},
+      {0.0054073, 1.4046135, 0.2148476, -5.7991010, 14.1799334, -13.7451454, 4.6458526},
+      {0.3340998, 1.3845902, 0.0950952, -19.3324410, 56.6905526, -65.3530326, 26.3124352}};
+  std::array<double, 3> colour;
+  for (std::size_t k = 0; k < 3; ++k) {
+    double sum = 0;
+    for (int n = 6; n >= 0; --n) sum = sum * t + c[k][n];
+    colour[k] = std::clamp(sum, 0.0, 1.0);
+  }
+  return colour;
+}
+
+}  // namespace
+
+std::vector<std::string> colour_fields(const FrameData& frame) {
+  std::vector<std::string> names;
+  for (const auto& [name, values] : frame.field) {
+    const std::size_t each = components(frame, values);
+    if (each != 1 && each != 3) continue;
+    names.push_back(name);
+    if (name == "velocity") names.push_back("speed");
+  }
+  return names;
+}
+
+std::optional<std::vector<double>> field_values(const FrameData& frame, const std::string& field) {
+  const auto found = frame.field.find(stored_name(field));
+  if (found == frame.field.end()) return std::nullopt;
+  const std::vector<double>& values = found->second;
+  const std::size_t each = components(frame, values);
+  if (each == 1) return values;
+  if (each != 3) return std::nullopt;
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < values.size(); k += 3) {
+    lengths.push_back(norm({values[k], values[k + 1], values[k + 2]}));
+  }
+  return lengths;
+}
+
+std::vector<double> shown_values(const FrameData* surface, const FrameData* phyxels,
+                                 const Colouring& colouring) {
+  const auto of = [&](const FrameData* frame) {
+    return frame == nullptr ? std::nullopt : field_values(*frame, colouring.field);
+  };
+  if (surface == nullptr) return of(phyxels).value_or(std::vector<double>{});
+  if (const auto own = of(surface)) return *own;
+  const auto values = of(phyxels);
+  const Carriers& carriers = colouring.carriers;
+  if (!values || carriers.phyxel.size() != Carriers::each * surface->point.size()) return {};
+  std::vector<double> shown;
+  for (std::size_t k = 0; k < carriers.phyxel.size(); k += Carriers::each) {
+    double sum = 0;
+    for (std::size_t c = k; c < k + Carriers::each; ++c) {
+      sum += carriers.weight[c] * (*values)[carriers.phyxel[c]];
+    }
+    shown.push_back(sum / 255);
+  }
+  return shown;
+}
+
+Colour field_colour(double value, const Colouring& colouring) {
+  const double width = colouring.high - colouring.low;
+  const double t = width > 0 ? std::clamp((value - colouring.low) / width, 0.0, 1.0) : 0;
+  const auto linear = [](double s) {  // of sRGB (IEC 61966-2-1)
+    return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
+  };
+  const auto [r, g, b] = viridis(std::isfinite(t) ? t : 0);
+  return {linear(r), linear(g), linear(b)};
+}
+
+void draw_colour_bar(Image& image, const Colouring& colouring) {
+  const double scale = text_scale(image);
+  const auto text_width = [&](const std::string& text) {
+    return static_cast<int>(6 * scale * static_cast<double>(text.size()));
+  };
+  const int margin = static_cast<int>(9 * scale), line = static_cast<int>(11 * scale);
+  const int width = std::max(image.width / 4, 2), height = static_cast<int>(6 * scale);
+  const int left = image.width - margin - width, top = image.height - margin - line - height;
+  if (left < 0 || top - line < 0) return;  // the picture has no room
+  for (int x = 0; x < width; ++x) {
+    const auto colour = viridis(static_cast<double>(x) / (width - 1));
+    for (int y = top; y < top + height; ++y) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        image.pixel(left + x, y)[k] = static_cast<std::uint8_t>(std::lround(255 * colour[k]));
+      }
+    }
+  }
+  const std::string unit = unit_of(colouring.field);
+  const std::string low = fmt::format("{:.3g}", colouring.low),
+                    high = fmt::format("{:.3g}", colouring.high);
+  draw_text(image, left, top - line, scale,
+            unit.empty() ? colouring.field : fmt::format("{} [{}]", colouring.field, unit));
+  const int below = top + height + static_cast<int>(4 * scale);
+  draw_text(image, left, below, scale, low);
+  draw_text(image, left + width - text_width(high), below, scale, high);
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,40 @@
+/// Colours of pictures that show a field of the frames.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "colour.hpp"
+#include "phyxel/recorder.hpp"
+#include "rasteriser.hpp"
+#include "report/replay_data.hpp"
+
+namespace phyxel::app {
+
+/// A field that colours show, and the range of numbers that they span.
+struct Colouring {
+  std::string field;         ///< A name in `colour_fields`.
+  double low = 0, high = 1;  ///< In the unit of the field.
+  Carriers carriers;         ///< Of surfels, which take fields that their frames lack from phyxels.
+};
+
+/// Names of the fields of a frame that colours can show: numbers and vectors, whose lengths are
+/// shown; "speed" is that of the velocity.
+std::vector<std::string> colour_fields(const FrameData& frame);
+
+/// A field's value at each point of a frame; unset if the frame lacks it.
+std::optional<std::vector<double>> field_values(const FrameData& frame, const std::string& field);
+
+/// The values at the points of a picture, which are those of a surface, or else of phyxels. A frame
+/// that lacks the field has none. @param surface,phyxels null if there is none
+std::vector<double> shown_values(const FrameData* surface, const FrameData* phyxels,
+                                 const Colouring& colouring);
+
+/// The colour of a number between `low` and `high`, in viridis.
+Colour field_colour(double value, const Colouring& colouring);
+
+/// Draws a bar with the colours, their range, and the field's name and unit into a corner.
+void draw_colour_bar(Image& image, const Colouring& colouring);
+
+}  // namespace phyxel::app

@@ -1,0 +1,129 @@
+/// Pictures whose colours show a field of the frames.
+#include "colouring.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "support/program.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using test::Outcome;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+TEST(Colouring, ShowsNumbersAndLengthsOfVectors) {
+  FrameData frame;
+  frame.point = {{0, 0, 0}, {1, 0, 0}};
+  frame.field["velocity"] = {3, 4, 0, 0, 0, 2};
+  frame.field["von_mises"] = {7, 9};
+  frame.field["stress"] = std::vector<double>(12, 1.0);  // six components: neither
+  EXPECT_THAT(colour_fields(frame), ElementsAre("velocity", "speed", "von_mises"));
+  EXPECT_THAT(*field_values(frame, "speed"), ElementsAre(5, 2));
+  EXPECT_THAT(*field_values(frame, "von_mises"), ElementsAre(7, 9));
+  EXPECT_FALSE(field_values(frame, "stress"));
+  EXPECT_FALSE(field_values(frame, "mass"));
+}
+
+TEST(Colouring, SurfelsTakeMeansOfPhyxelsUnlessTheyHaveTheField) {
+  FrameData surface, phyxels;
+  surface.point = {{0, 0, 0}};
+  phyxels.point = {{0, 0, 0}, {1, 0, 0}};
+  phyxels.field["mass"] = {10, 20};
+  const Colouring colouring{.field = "mass", .carriers = {{0, 1, 0, 0}, {204, 51, 0, 0}}};
+  EXPECT_THAT(shown_values(&surface, &phyxels, colouring), ElementsAre(12));  // 0.8, 0.2
+  EXPECT_THAT(shown_values(nullptr, &phyxels, colouring), ElementsAre(10, 20));
+  EXPECT_THAT(shown_values(&surface, nullptr, colouring), IsEmpty());
+  surface.field["mass"] = {5};
+  EXPECT_THAT(shown_values(&surface, &phyxels, colouring), ElementsAre(5));
+}
+
+TEST(Colouring, SpansViridisAndNoMore) {
+  const Colouring colouring{.field = "mass", .low = 1, .high = 3};
+  const auto expect = [&](double value, int red, int green, int blue) {
+    const Colour c = field_colour(value, colouring);
+    // The polynomial is a fit of matplotlib's table, to 5 of 255.
+    EXPECT_NEAR(encode(c.x), red, 5);
+    EXPECT_NEAR(encode(c.y), green, 5);
+    EXPECT_NEAR(encode(c.z), blue, 5);
+  };
+  for (const double low : {-9.0, 1.0, std::nan("")}) expect(low, 68, 1, 84);
+  expect(2, 33, 145, 140);
+  for (const double high : {3.0, 1e9}) expect(high, 253, 231, 37);
+}
+
+TEST(Colouring, ABarSaysTheRangeAndLeavesTheRestAlone) {
+  Image blank{320, 240, std::vector<std::uint8_t>(320 * 240 * 3, 255)}, image = blank;
+  draw_colour_bar(image, {.field = "speed", .low = 0, .high = 2});
+  for (int y = 0; y < image.height; ++y) {
+    for (int x = 0; x < image.width; ++x) {
+      const bool same = std::equal(image.pixel(x, y), image.pixel(x, y) + 3, blank.pixel(x, y));
+      if (x < image.width / 2 || y < image.height / 2) {
+        ASSERT_TRUE(same) << x << ", " << y;
+      }
+    }
+  }
+  EXPECT_NE(image.rgb, blank.rgb);
+  Image tiny{16, 16, std::vector<std::uint8_t>(16 * 16 * 3, 255)};
+  EXPECT_NO_THROW(draw_colour_bar(tiny, {.field = "speed"}));
+}
+
+class ColouredPictures : public test::Program {
+ protected:
+  void SetUp() override {
+    Program::SetUp();
+    write("scene.toml", R"([time]
+end = 0.02
+[solver]
+device = "cpu"
+[output]
+directory = "out"
+frames_per_second = 100
+[[body]]
+shape = "block"
+size = [1, 1, 1]
+spacing = 0.25
+velocity = [0, 0, 2]
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+)");
+    const Outcome done = run({"run", "scene.toml"});
+    ASSERT_EQ(done.code, 0) << done.err;
+  }
+};
+
+TEST_F(ColouredPictures, ShowAFieldOfThePhyxelsOnTheSurface) {
+  ASSERT_EQ(run({"render", "out", "--frames", "1", "--out", "plain"}).code, 0);
+  const auto coloured = [&](const char* range, const char* out) {
+    const Outcome done = run({"render", "out", "--frames", "1", "--color", "speed", "--range",
+                              range, "--out", out, "--width", "96", "--height", "96"});
+    EXPECT_EQ(done.code, 0) << done.err;
+    const std::string png = test::text_of(folder_ / out / "frame_000001.png");
+    EXPECT_FALSE(png.empty());
+    return png;
+  };
+  // All of the block moves at 2 m/s: it is at one end of these ranges, or at the other.
+  EXPECT_NE(coloured("0,1", "high"), coloured("3,4", "low"));
+}
+
+TEST_F(ColouredPictures, WrongFieldsAndRangesAreRefused) {
+  const auto refused = [&](const std::vector<std::string>& more, const char* why) {
+    std::vector<std::string> words{"render", "out", "--out", "none"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(why));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "none"));
+  };
+  refused({"--colour", "von_mises"}, "allowed: displacement, speed, velocity");
+  refused({"--colour", "speed", "--range", "2,1"}, "--range 2,1: allowed: two numbers");
+}
+
+}  // namespace
+}  // namespace phyxel::app
