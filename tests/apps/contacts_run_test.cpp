@@ -126,24 +126,26 @@ TEST_F(ContactsOfRuns, JawsCarryABarByFriction) {
 }
 
 TEST_F(ContactsOfRuns, AreTheSameBytesAfterARestartInTheMiddleOfACollision) {
-  write_beam("0.2", "");
-  replace_in_beam("[[body.fixed]]\nregion = \"x-\"\n", "");
-  write("beam.toml", text_of(folder_ / "beam.toml") +
-                         "[[obstacle]]\nshape = 'sphere'\nradius = 0.3\nfriction = 0.4\n"
-                         "translation = [0.2, 0.05, -0.405]\n");
-  const Outcome whole = run({"run", "beam.toml"});
-  ASSERT_EQ(whole.code, 0) << whole.err;
-  EXPECT_THAT(whole.out, HasSubstr("obstacle    obstacle 1: sphere at [0.2, 0.05, -0.405] m"));
-  EXPECT_THAT(whole.out, HasSubstr("contact     obstacle 1: force on the bodies ("));
-  const std::string log = text_of(folder_ / "out" / "contacts.csv"),
-                    energies = text_of(folder_ / "out" / "energy.csv");
-  EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1 + 11);  // frames
+  for (const std::string method : {"", "method = 'penalty'\n"}) {
+    write_beam("0.2", "");
+    replace_in_beam("[[body.fixed]]\nregion = \"x-\"\n", "");
+    write("beam.toml", text_of(folder_ / "beam.toml") +
+                           "[[obstacle]]\nshape = 'sphere'\nradius = 0.3\nfriction = 0.4\n" +
+                           method + "translation = [0.2, 0.05, -0.405]\n");
+    const Outcome whole = run({"run", "beam.toml", "--force"});
+    ASSERT_EQ(whole.code, 0) << whole.err;
+    EXPECT_THAT(whole.out, HasSubstr("obstacle    obstacle 1: sphere at [0.2, 0.05, -0.405] m"));
+    EXPECT_THAT(whole.out, HasSubstr("contact     obstacle 1: force on the bodies ("));
+    const std::string log = text_of(folder_ / "out" / "contacts.csv"),
+                      energies = text_of(folder_ / "out" / "energy.csv");
+    EXPECT_EQ(std::count(log.begin(), log.end(), '\n'), 1 + 11);  // frames
 
-  ASSERT_EQ(run({"run", "beam.toml", "--force", "--until", "0.1"}).code, 0);
-  const Outcome resumed = run({"run", "beam.toml", "--resume", "auto"});
-  ASSERT_EQ(resumed.code, 0) << resumed.err;
-  EXPECT_EQ(text_of(folder_ / "out" / "contacts.csv"), log);
-  EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), energies);
+    ASSERT_EQ(run({"run", "beam.toml", "--force", "--until", "0.1"}).code, 0);
+    const Outcome resumed = run({"run", "beam.toml", "--resume", "auto"});
+    ASSERT_EQ(resumed.code, 0) << resumed.err;
+    EXPECT_EQ(text_of(folder_ / "out" / "contacts.csv"), log);
+    EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), energies);
+  }
 }
 
 TEST_F(ContactsOfRuns, OfFrictionAreRefusedToImplicitSteps) {

@@ -83,5 +83,65 @@ TEST_F(Mpirun, GasesCurvesAndPlanesOfSymmetryAreTheSameOnAllRanks) {
   }
 }
 
+/// Bodies that meet above a floor, kept apart by penalties, and one of them held at an end.
+constexpr const char* soft_contact = R"(
+gravity = [0, 0, -9.81]
+[time]
+end = 0.06
+[contact]
+method = "penalty"
+friction = 0.3
+[[obstacle]]
+shape = "plane"
+translation = [0, 0, -0.201]
+[[body]]
+name = "held"
+shape = "block"
+size = [0.4, 0.3, 0.2]
+spacing = 0.05
+[[body.fixed]]
+region = "x-"
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[[body]]
+name = "thrown"
+shape = "sphere"
+radius = 0.1
+spacing = 0.03
+translation = [0.303, 0.02, 0]
+velocity = [-0.6, 0, 0]
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[[body]]
+name = "dropped"
+shape = "block"
+size = [0.2, 0.2, 0.1]
+spacing = 0.04
+translation = [0.6, 0, -0.15]
+velocity = [0, 0, -0.3]
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+)";
+
+TEST_F(Mpirun, PenaltiesBetweenBodiesAreTheSameOnAllRanks) {
+  write("soft.toml", soft_contact);
+  const Outcome alone = run_on(0, {"run", "soft.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_THAT(alone.out, HasSubstr("penalties of stiffness 0.1"));
+  EXPECT_THAT(test::text_of(folder_ / "alone" / "energy.csv"), HasSubstr("contact_energy"));
+  for (const int ranks : {2, 3}) {
+    const std::string name = std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "soft.toml", "--out", name});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    expect_same_files("alone", name);
+  }
+}
+
 }  // namespace
 }  // namespace phyxel
