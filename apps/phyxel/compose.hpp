@@ -16,17 +16,12 @@ namespace phyxel::app {
 struct Setting {
   Camera camera;
   Vec3d up{0, 0, 1};
-  double spacing = 0;                    ///< Typical distance between phyxels [m].
-  double extent = 0;                     ///< Extent of the visible points [m].
-  int time_decimals = 2;                 ///< Decimals of the time label; negative for no label.
-  Vec3d middle;                          ///< Of the visible points [m].
-  std::vector<Obstacle> obstacles = {};  ///< Drawn where they are at the time of a frame.
-  RigidPaths paths = {};                 ///< Of those that are free bodies.
   double spacing = 0;                       ///< Typical distance between phyxels [m].
   double extent = 0;                        ///< Extent of the visible points [m].
   int time_decimals = 2;                    ///< Decimals of the time label; negative for no label.
   Vec3d middle;                             ///< Of the visible points [m].
   std::vector<Obstacle> obstacles = {};     ///< Drawn where they are at the time of a frame.
+  RigidPaths paths = {};                    ///< Of those that are free bodies.
   std::optional<Colouring> colouring = {};  ///< Unset: bodies have colours of their own.
 };
 

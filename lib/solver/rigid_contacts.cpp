@@ -220,7 +220,9 @@ void RigidContacts::sweep_all(double speed, std::vector<Moving>& moving) {
   };
   for (int sweep = 0; sweep < most_sweeps; ++sweep) {
     double largest = 0;  // change of a velocity
-    for (Touch& t : touches_) {
+    for (std::size_t k = 0; k < touches_.size(); ++k) {
+      // There and back, so that what a sweep finds out runs through a stack both ways.
+      Touch& t = touches_[sweep % 2 == 0 ? k : touches_.size() - 1 - k];
       const auto relative = [&] {
         return t.given + velocity_at(t.first, t.arm) - velocity_at(t.second, t.other_arm);
       };
