@@ -30,18 +30,20 @@ class PlacedLayer {
 
   /// Calls each(k, x, gap) for the phyxels inside an obstacle, ascending: k counts the phyxels of
   /// the layer, x is where each is [m], and gap that of its body's surface there to the obstacle.
+  /// @param below gap up to which phyxels count as inside [m]
   template <class Each>
-  void for_each_inside(const Obstacle& obstacle, const ObstacleStep& at, Each&& each) const {
+  void for_each_inside(const Obstacle& obstacle, const ObstacleStep& at, Each&& each,
+                       double below = 0) const {
     const ContactLayer& layer = model_.contact;
     ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
       for (std::size_t g = 0; g < groups_.size(); ++g) {
-        if (is_clear_of(obstacle, at, boxes_[g], groups_[g].offset)) continue;
+        if (is_clear_of(obstacle, at, boxes_[g], groups_[g].offset + below)) continue;
         for (std::size_t k = groups_[g].begin; k < groups_[g].end; ++k) {
           const Index i = layer.phyxels[k];
           const Vec3d x = model_.position[i] + displacement_(i);
           Gap gap = gap_to(shape, at, x);
           gap.distance -= layer.offset[k];
-          if (gap.distance < 0) each(k, x, gap);
+          if (gap.distance < below) each(k, x, gap);
         }
       }
     });

@@ -64,7 +64,7 @@ std::vector<SceneSection> boundary_sections() {
        "back on the phyxels of the other surface near them, so that both momenta are kept. Bodies need closed surfaces, and may touch at the "
        "start but not overlap. Each frame adds a line for each body to `contacts.csv`, with force, torque, impulse, angular impulse and work of all other bodies on "
        "it; heat and losses of a body are its share, which may be negative: their sums over the bodies are what contact has taken from the motion. "
-       "Friction and restitution are those of Verlet's steps; implicit steps and searches for equilibrium have contact without them."},
+       "Restitution is that of Verlet's steps alone: in implicit steps and searches for equilibrium contact is elastic."},
       {"contact.pair", "[[contact.pair]]", "",
        "Two bodies that touch. Without `all = true`, bodies that are in no pair touch nothing but obstacles."},
       {"probe", "[[probe]]", "selection",

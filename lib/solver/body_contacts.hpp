@@ -30,6 +30,8 @@ class TouchingPoints {
   /// Numbers, in the layer, of this rank's points.
   std::span<const Index> own() const { return own_; }
   std::span<const SurfaceSite> sites() const { return site_; }
+  /// The index of each point in the whole model.
+  std::span<const Index> ids() const { return id_; }
   /// The body that each point belongs to.
   std::span<const Index> bodies() const { return body_; }
   std::span<const ContactRow> rows() const { return rows_.rows; }

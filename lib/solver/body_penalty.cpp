@@ -13,8 +13,7 @@
 namespace phyxel {
 namespace {
 
-constexpr double reach = 0.25;           // gap of points that may touch before the next `linearise`
-constexpr double rounding_reach = 1e-6;  // gap up to which a point counts as held
+constexpr double reach = 0.25;  // gap of points that may touch before the next `linearise`
 
 }  // namespace
 
@@ -23,6 +22,12 @@ BodyPenalty::BodyPenalty(const Model& model) : model_(model), points_(model) {
   for (const auto& distances : model.body_contact.distances) {
     fields_.push_back(distances ? distances.view() : PlacedDistances{});
   }
+  const auto note = [&](const ContactLaw& law) {
+    rubs_ = rubs_ || law.static_friction > 0;
+    has_two_frictions_ = has_two_frictions_ || has_two_frictions(law);
+  };
+  note(model.body_contact.law);
+  for (const BodyContact::Pair& pair : model.body_contact.pairs) note(pair.law);
 }
 
 void BodyPenalty::find_points(const Vector& u) {
@@ -82,9 +87,13 @@ void BodyPenalty::find_touches() {
   knows_shapes_ = true;
   shaped_at_.clear();
   for (std::size_t p = 0; p < count(); ++p) shaped_at_.push_back(motion_[p].after);
+  if (!rubs_) return;
+  shape_place_.clear();
+  for (const SurfaceMotion& motion : motion_) shape_place_.push_back(motion.after);
 }
 
-void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient) {
+void BodyPenalty::linearise(const Vector& u, const SlipMeasure& slip,
+                            const std::vector<Mat3d>& gradient) {
   if (empty()) return;
   knows_expected_ = knows_points_;
   if (knows_expected_) expected_ = gaps(u);
@@ -112,6 +121,7 @@ void BodyPenalty::linearise(const Vector& u, const std::vector<Mat3d>& gradient)
   }
   gap_.resize(rows);
   for (std::size_t r = 0; r < rows; ++r) gap_[r] = touches_[r].gap;
+  if (rubs_) find_rubbing(slip);
   find_blocks();
 }
 
@@ -138,6 +148,7 @@ bool BodyPenalty::mix(const Vector& u) {
   for (std::size_t r = 0; r < gap_.size(); ++r) {
     if (touches_[r].is_inside) gap_[r] = next[r] + way[r];
   }
+  if (rubs_) mix_friction();
   return true;
 }
 
@@ -196,6 +207,9 @@ void BodyPenalty::add(const Vector& u, Vector& force) const {
   if (empty()) return;
   const std::vector<Vec3d> forces = spread(pushes(u));
   for (std::size_t p = 0; p < count(); ++p) force[phyxel(p)] += forces[p];
+  if (!rubs_) return;
+  const std::vector<Vec3d> along = friction(u);
+  for (std::size_t p = 0; p < count(); ++p) force[phyxel(p)] += along[p];
 }
 
 void BodyPenalty::add_energy(const Vector& u, ExactSum& sum) const {
@@ -204,6 +218,7 @@ void BodyPenalty::add_energy(const Vector& u, ExactSum& sum) const {
   for (std::size_t r = 0; r < push.size(); ++r) {
     if (is_own(r) && push[r] > 0) sum.add(0.5 * push[r] * push[r] / stiffness_[r]);
   }
+  if (rubs_) add_friction_energy(u, sum);
 }
 
 void BodyPenalty::add_squares(ExactSum& sum) const {
@@ -220,7 +235,14 @@ void BodyPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
   for (std::size_t r = 0; r < pull.size(); ++r) {
     if (is_held(r)) pull[r] = stiffness_[r] * along_normal(r, moved);
   }
-  const std::vector<Vec3d> forces = spread(pull);
+  std::vector<Vec3d> forces = spread(pull);
+  if (rubs_) {
+    std::vector<Vec3d> along(pull.size());
+    for (std::size_t r = 0; r < along.size(); ++r) {
+      if (rubbing_[r].acts()) along[r] = rubbing_[r].stiffness * slip(r, moved);
+    }
+    add_friction(along, forces);
+  }
   for (std::size_t p = 0; p < count(); ++p) out[phyxel(p)] += forces[p];
 }
 
@@ -241,6 +263,7 @@ void BodyPenalty::find_blocks() {
     for_each_carrier(
         r, [&](Index p, const SurfaceShare& carries) { add_to(p, carries.part * carries.part); });
   }
+  if (rubs_) add_friction_to_blocks();
 }
 
 BodyPenalty::Depths BodyPenalty::depths() const {
@@ -255,16 +278,20 @@ BodyPenalty::Depths BodyPenalty::depths() const {
   return found;
 }
 
-void BodyPenalty::add_to(const Vector& velocity, double time, std::span<ExactSum> sums) const {
+void BodyPenalty::add_to(const Vector& u, const Vector& velocity, double time,
+                         std::span<ExactSum> sums) const {
   if (empty()) return;
   std::vector<double> push(touches_.size());
   for (std::size_t r = 0; r < push.size(); ++r) push[r] = push_at(r, touches_[r].gap);
   const std::vector<Vec3d> forces = spread(push);
+  const std::vector<Vec3d> along = rubs_ ? friction(u) : std::vector<Vec3d>(count());
   for (std::size_t p = 0; p < count(); ++p) {
-    if (forces[p] == Vec3d{}) continue;
+    if (forces[p] == Vec3d{} && along[p] == Vec3d{}) continue;
     const Part& part = part_of(model_, phyxel(p));
-    ContactTerms terms;  // an energy loses nothing
-    terms.set(time * forces[p], {}, motion_[p].after - part.centre, velocity[phyxel(p)], {});
+    const Vec3d v = velocity[phyxel(p)];
+    ContactTerms terms;
+    terms.set(time * forces[p], time * along[p], motion_[p].after - part.centre, v, v);
+    terms.value[ContactTerms::impact_loss] = 0;  // an energy loses nothing
     for (int t = 0; t < ContactTerms::count; ++t) {
       sums[static_cast<std::size_t>(part.body) * ContactTerms::count + t].add(terms.value[t]);
     }

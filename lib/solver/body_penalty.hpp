@@ -9,13 +9,16 @@
 #include "phyxel/model.hpp"
 #include "solver/anderson.hpp"
 #include "solver/body_contacts.hpp"
+#include "solver/slip.hpp"
 
 namespace phyxel {
 
 /// The contact of bodies with each other by penalties. Between two calls of `linearise`, normals
 /// and shares stay what they were, so that forces are the derivative of an energy:
 ///   E = Σ ½ k g²  over g < 0,   g = g₀ + n̄ · (d_p - Σ r_k d_k),
-/// with displacements d since then.
+/// with displacements d since then. Friction has a potential of the slips then
+/// (`friction_penalty`), which are the same but along surfaces (`slip_share`), since the start of a
+/// stage.
 class BodyPenalty {
  public:
   using Vector = OwnedVectors::Vector;
@@ -25,12 +28,21 @@ class BodyPenalty {
 
   /// True in scenes whose bodies do not touch each other.
   bool empty() const { return !model_.body_contact.acts(); }
+  /// True if the contact of some bodies has friction.
+  bool rubs() const { return rubs_; }
   /// Finds which points are near other bodies, and how. Of a share: collective, as all that follow.
-  /// @param u displacements [m]. @param gradient of displacement, shape [n, 3, 3]
-  void linearise(const Vector& u, const std::vector<Mat3d>& gradient);
+  /// @param u displacements [m]. @param slip what slip is; not used without friction
+  /// @param gradient of displacement, shape [n, 3, 3]
+  void linearise(const Vector& u, const SlipMeasure& slip, const std::vector<Mat3d>& gradient);
   /// Begins a search anew: points, normals and gaps of earlier searches have no influence on it, so
   /// that a restart gives the same bits.
-  void forget() { knows_points_ = false; }
+  void forget() {
+    knows_points_ = false;
+    record_.forget();
+  }
+  /// As of `ContactPenalty`.
+  bool begin_sliding();
+  void be_careful(bool careful) { record_.be_careful(careful); }
   /// Replaces the gaps at u, the displacements of `linearise`, by those from which the next step of
   /// Newton's method is most likely to lead to a place where gaps are what it takes them for: they
   /// depend on deformation in ways that the stiffness does not know.
@@ -60,9 +72,10 @@ class BodyPenalty {
     double share = 0;
   };
   Depths depths() const;
-  /// Adds to the sums of each body what the forces at `linearise` do over a time [s].
+  /// Adds to the sums of each body what the forces at u, the displacements of `linearise`, do over
+  /// a time [s].
   /// @param velocity of each phyxel in that time [m/s]. @param sums of the bodies (`ContactTerms`)
-  void add_to(const Vector& velocity, double time, std::span<ExactSum> sums) const;
+  void add_to(const Vector& u, const Vector& velocity, double time, std::span<ExactSum> sums) const;
 
  private:
   std::size_t count() const { return points_.own().size(); }
@@ -82,12 +95,31 @@ class BodyPenalty {
   /// True if a row pushes, or would at once.
   bool is_held(std::size_t r) const;
   void find_blocks();
+  void add_friction_to_blocks();
   /// Vectors of the points, from those of phyxels.
   std::vector<Vec3d> of_points(const Vector& of_phyxels) const;
   /// The part along a row's normal of the vector of its point relative to those that carry it.
   double along_normal(std::size_t r, const std::vector<Vec3d>& of_points) const;
   /// Forces along normals that rows exert, on this rank's points.
   std::vector<Vec3d> spread(const std::vector<double>& push) const;
+  RubbingRecord::Key key(std::size_t r) const {
+    const ContactRow& row = points_.rows()[r];
+    return {points_.ids()[row.point], row.body};
+  }
+  /// Finds the slips at `linearise`, and friction by the present gaps.
+  void find_rubbing(SlipMeasure measure);
+  /// Sets friction anew where gaps have changed.
+  void mix_friction();
+  /// The slip of a row's point, from the motions of all points [m].
+  Vec3d slip(std::size_t r, const std::vector<Vec3d>& moved) const;
+  /// Calls each(r, friction) for the rows that rub, at displacements u. Collective on a share.
+  template <class Each>
+  void for_each_friction(const Vector& u, Each&& each) const;
+  void add_friction_energy(const Vector& u, ExactSum& sum) const;
+  /// Adds forces along surfaces on the points of rows, and their reactions, to this rank's points.
+  void add_friction(const std::vector<Vec3d>& of_rows, std::vector<Vec3d>& force) const;
+  /// Friction at displacements u on this rank's points [N], shape [own points].
+  std::vector<Vec3d> friction(const Vector& u) const;
   /// Gaps at displacements u [m]; of points that are not near other bodies, what they were.
   std::vector<double> gaps(const Vector& u) const;
   /// The force along the normal of a row at a gap [m] [N].
@@ -110,6 +142,13 @@ class BodyPenalty {
   std::vector<double> stiffness_;        // k of each row [N/m]
   std::vector<Mat3d> blocks_;            // of this rank's points [N/m]
   AndersonMixing mixing_;
+  // Of friction; empty without it.
+  bool rubs_ = false, has_two_frictions_ = false;
+  double slip_share_ = 0;  // as of `SlipMeasure`
+  RubbingRecord record_;
+  std::vector<Vec3d> shape_place_;       // places of all points when normals were found [m]
+  std::vector<Vec3d> slip_from_;         // displacements of all points as the stage starts [m]
+  std::vector<RubbingContact> rubbing_;  // shape [rows]
   // Whether points, normals and expected gaps belong to this search; the same on all ranks.
   bool knows_points_ = false, knows_shapes_ = false, knows_expected_ = false;
 };

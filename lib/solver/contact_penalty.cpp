@@ -11,10 +11,11 @@
 #include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
-PlacedObstacles obstacles_after(const Model& model, double share) {
+PlacedObstacles obstacles_after(const Model& model, double share, double since) {
   PlacedObstacles placed;
   for (const Obstacle& obstacle : model.obstacles) {
-    placed.push_back(obstacle.step_between({}, obstacle.motion.path_after(share), 0));
+    const Motion& motion = obstacle.motion;
+    placed.push_back(obstacle.step_between(motion.path_after(since), motion.path_after(share), 1));
   }
   return placed;
 }
@@ -41,7 +42,20 @@ ContactPenalty::ContactPenalty(const Model& model)
       groups_(groups_of(model, model.contact)),
       stiffness_(stiffness_of_layer(model, share_of_stiffness)),
       blocks_(model.contact.phyxels.size()),
-      bodies_(model) {}
+      bodies_(model) {
+  for (const LayerGroup& group : groups_) {
+    largest_support_ = std::max(largest_support_, group.support);
+  }
+  for (const Obstacle& obstacle : model.obstacles) {
+    obstacles_rub_ = obstacles_rub_ || obstacle.law.static_friction > 0;
+    have_two_frictions_ = have_two_frictions_ || has_two_frictions(obstacle.law);
+  }
+}
+
+void ContactPenalty::forget() {
+  record_.forget();
+  bodies_.forget();
+}
 
 template <class Each>
 void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const {
@@ -53,7 +67,51 @@ void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, 
   }
 }
 
-void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u,
+void ContactPenalty::find_rubbing(const PlacedObstacles& at, const Vector& u,
+                                  const SlipMeasure& slip) {
+  rubbing_.clear();
+  const PlacedLayer layer(model_, groups_, [&](Index i) { return u[i]; });
+  const double reach = record_.reach(slip);
+  for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
+    const Obstacle& obstacle = model_.obstacles[o];
+    if (!(obstacle.law.static_friction > 0)) continue;
+    const auto add = [&](std::size_t k, Vec3d x, const Gap& gap) {
+      const Index i = model_.contact.phyxels[k];
+      if (reach > 0 && !(gap.distance < reach * model_.neighbourhood.support[i])) return;
+      Rubbing found;
+      found.phyxel = k;
+      found.obstacle = o;
+      found.normal = gap.normal;
+      found.surface = slip.from[i] + at[o].dt * surface_velocity(at[o], x);
+      found.slip = along(gap.normal, u[i] - found.surface);
+      const Vec3d ahead =
+          slip.starts_moving() ? along(gap.normal, slip.ahead[i] - found.surface) : Vec3d{};
+      record_.set_friction(found.key(), obstacle.law, std::max(0.0, -stiffness_[k] * gap.distance),
+                           stiffness_[k], slip, ahead, found);
+      rubbing_.push_back(found);
+    };
+    layer.for_each_inside(obstacle, at[o], add, reach * largest_support_);
+  }
+  record_.end_linearise();
+}
+
+PenaltyForce ContactPenalty::friction_of(const Rubbing& rubbing, const Vector& u) const {
+  const Vec3d way = u[model_.contact.phyxels[rubbing.phyxel]] - rubbing.surface;
+  return friction_penalty(rubbing.limit, rubbing.normal, along(rubbing.normal, way), false);
+}
+
+bool ContactPenalty::begin_sliding() {
+  bool begins = bodies_.begin_sliding();
+  if (!have_two_frictions_) return begins;
+  for (const Rubbing& rubbing : rubbing_) {
+    const ContactLaw& law = model_.obstacles[rubbing.obstacle].law;
+    if (!has_two_frictions(law) || !rubbing.has_slid()) continue;
+    begins = record_.note_sliding(rubbing.key()) || begins;
+  }
+  return model_.share ? model_.share->communicator->largest(begins ? 1.0 : 0.0) > 0 : begins;
+}
+
+void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u, const SlipMeasure& slip,
                                const std::function<std::vector<Mat3d>()>& gradient_of_u) {
   std::fill(blocks_.begin(), blocks_.end(), Mat3d{});
   normal_forces_ = 0;
@@ -61,7 +119,9 @@ void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u,
     blocks_[k] += f.stiffness;
     normal_forces_ += dot(f.force, f.force);
   });
-  if (!bodies_.empty()) bodies_.linearise(u, gradient_of_u());
+  if (obstacles_rub_) find_rubbing(at, u, slip);
+  for (const Rubbing& rubbing : rubbing_) blocks_[rubbing.phyxel] += rubbing.stiffness;
+  if (!bodies_.empty()) bodies_.linearise(u, slip, gradient_of_u());
   held_.clear();
   for (std::size_t k = 0; k < blocks_.size(); ++k) {
     const Mat3d& block = blocks_[k];
@@ -74,6 +134,9 @@ void ContactPenalty::add(const PlacedObstacles& at, const Vector& u, Vector& for
   for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {
     force[model_.contact.phyxels[k]] += f.force;
   });
+  for (const Rubbing& rubbing : rubbing_) {
+    force[model_.contact.phyxels[rubbing.phyxel]] += friction_of(rubbing, u).force;
+  }
   bodies_.add(u, force);
 }
 
@@ -82,6 +145,7 @@ double ContactPenalty::energy(const PlacedObstacles& at, const Vector& u) const 
   ExactSum sum;
   for_each_force(
       at, u, [&](std::size_t, std::size_t, const PenaltyForce& f, Vec3d) { sum.add(f.energy); });
+  for (const Rubbing& rubbing : rubbing_) sum.add(friction_of(rubbing, u).energy);
   bodies_.add_energy(u, sum);
   if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
   return sum.value();
@@ -129,15 +193,29 @@ double ContactPenalty::largest_depth(const PlacedObstacles& at, const Vector& u)
 
 void ContactPenalty::add_to(const PlacedObstacles& at, const Vector& u, const Vector& velocity,
                             double time, std::span<ExactSum> sums) const {
+  const auto add_terms = [&](std::size_t o, const ContactTerms& terms) {
+    for (int t = 0; t < ContactTerms::count; ++t) {
+      sums[o * ContactTerms::count + t].add(terms.value[t]);
+    }
+  };
   for_each_force(at, u, [&](std::size_t, std::size_t o, const PenaltyForce& f, Vec3d x) {
     const ObstacleStep& step = at[o];
     ContactTerms terms;  // an energy loses nothing
     terms.set(time * f.force, {}, x - step.place_at_rest, rigid_velocity(step, x), {});
-    for (int t = 0; t < ContactTerms::count; ++t) {
-      sums[o * ContactTerms::count + t].add(terms.value[t]);
-    }
+    add_terms(o, terms);
   });
-  bodies_.add_to(velocity, time, sums.subspan(model_.obstacles.size() * ContactTerms::count));
+  for (const Rubbing& rubbing : rubbing_) {
+    const Index i = model_.contact.phyxels[rubbing.phyxel];
+    const ObstacleStep& step = at[rubbing.obstacle];
+    const Vec3d x = model_.position[i] + u[i];
+    // What sticks moves with the surface over the stage, and so is without heat.
+    const Vec3d surface = surface_velocity(step, x);
+    ContactTerms terms;
+    terms.set({}, time * friction_of(rubbing, u).force, x - step.place_at_rest, surface,
+              velocity[i] - surface);
+    add_terms(rubbing.obstacle, terms);
+  }
+  bodies_.add_to(u, velocity, time, sums.subspan(model_.obstacles.size() * ContactTerms::count));
 }
 
 }  // namespace phyxel

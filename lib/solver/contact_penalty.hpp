@@ -11,6 +11,7 @@
 #include "phyxel/model.hpp"
 #include "phyxel/physics/contact_penalty.hpp"
 #include "solver/body_penalty.hpp"
+#include "solver/slip.hpp"
 #include "solver/step_sums.hpp"
 
 namespace phyxel {
@@ -18,9 +19,9 @@ namespace phyxel {
 /// The obstacles of a model at an instant.
 using PlacedObstacles = std::vector<ObstacleStep>;
 
-/// Returns the obstacles at a fraction of their paths. Oscillations and steady motions have no end,
-/// and are left out.
-PlacedObstacles obstacles_after(const Model& model, double share);
+/// Returns the obstacles at a fraction of their paths, with their ways since a smaller one as their
+/// velocities over a step of 1. Oscillations and steady motions have no end, and are left out.
+PlacedObstacles obstacles_after(const Model& model, double share, double since);
 
 /// Returns the obstacles at a time [s], with their velocities over the last `span` [s].
 PlacedObstacles obstacles_over(const Model& model, double time, double span);
@@ -41,13 +42,26 @@ class ContactPenalty {
   explicit ContactPenalty(const Model& model);
 
   bool empty() const { return model_.obstacles.empty() && bodies_.empty(); }
+  /// True if something has friction.
+  bool rubs() const { return obstacles_rub_ || bodies_.rubs(); }
   /// Finds the stiffness at displacements u, and how bodies touch there; it stays so until the next
-  /// call. Collective on a share.
-  /// @param gradient_of_u returns the gradients of displacement, for bodies that touch each other
-  void linearise(const PlacedObstacles& at, const Vector& u,
+  /// call. Friction counts as that of the normal forces at u. Collective on a share.
+  /// @param slip what slip is; not used without friction. @param gradient_of_u returns the
+  /// gradients of displacement, for bodies that touch each other
+  void linearise(const PlacedObstacles& at, const Vector& u, const SlipMeasure& slip,
                  const std::function<std::vector<Mat3d>()>& gradient_of_u);
   /// Begins a search anew, on which earlier searches have no influence.
-  void forget() { bodies_.forget(); }
+  void forget();
+  /// Gives the points that slide at the displacements of the last `linearise` the kinetic friction,
+  /// which counts from the next one on. Collective on a share. @returns true if that changes forces
+  bool begin_sliding();
+  /// From the next `linearise` on, slips of searches for rest lead to small steps or, near the end
+  /// of a search, to those of Newton's method: before normal forces are known well, friction may
+  /// seem not to hold what it holds.
+  void be_careful(bool careful) {
+    record_.be_careful(careful);
+    bodies_.be_careful(careful);
+  }
   /// Replaces the gaps between bodies at u, the displacements of the last `linearise`, by better
   /// ones to start a step of Newton's method from. @returns true if that changes forces
   bool mix(const Vector& u) { return bodies_.mix(u); }
@@ -79,12 +93,28 @@ class ContactPenalty {
   /// counts phyxels of the layer and o obstacles, and x is the phyxel's place [m].
   template <class Each>
   void for_each_force(const PlacedObstacles& at, const Vector& u, Each&& each) const;
+  /// A phyxel of the layer that rubs on an obstacle.
+  struct Rubbing : RubbingContact {
+    std::size_t phyxel = 0;    ///< Its number in the layer.
+    std::size_t obstacle = 0;  ///< Number of the obstacle.
+    Vec3d surface;  ///< Displacement of a phyxel that sticks to the obstacle's surface [m].
+    RubbingRecord::Key key() const {
+      return {static_cast<Index>(phyxel), static_cast<Index>(obstacle)};
+    }
+  };
+  void find_rubbing(const PlacedObstacles& at, const Vector& u, const SlipMeasure& slip);
+  /// Friction at displacements u.
+  PenaltyForce friction_of(const Rubbing& rubbing, const Vector& u) const;
 
   const Model& model_;
   std::vector<LayerGroup> groups_;
+  double largest_support_ = 0;     // of phyxels of the layer [m]
   std::vector<double> stiffness_;  // [N/m], shape [layer]
   std::vector<Mat3d> blocks_;      // [N/m], shape [layer]
   double normal_forces_ = 0;       // squared [N²], of this rank
+  bool obstacles_rub_ = false, have_two_frictions_ = false;
+  std::vector<Rubbing> rubbing_;  // by obstacle, then by phyxel
+  RubbingRecord record_;
   BodyPenalty bodies_;
   std::map<Index, Mat3d> held_;  // stiffness of phyxels in contact against themselves [N/m]
 };

@@ -11,6 +11,7 @@
 #include "rank_sums.hpp"
 #include "solver/contact_penalty.hpp"
 #include "solver/contact_stiffness.hpp"
+#include "solver/implicit_step.hpp"
 #include "solver/next_step.hpp"
 #include "solver/present_forces.hpp"
 
@@ -46,10 +47,17 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   ContactRates rates{StepSums(known.begin(), known.end())};
   if (!known.empty() && !model.body_contact.acts()) return rates;
   ContactPenalty penalty(model);
-  const PlacedObstacles at = solver.method() == Method::equilibrium
-                                 ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
-                                 : obstacles_over(model, solver.time(), solver.dt());
-  penalty.linearise(at, state.displacement, [&] {
+  const bool rests = solver.method() == Method::equilibrium;
+  const double stage = penalty.rubs() ? stage_of_step(solver.dt()) : solver.dt();
+  const double share = solver.steps() > 0 ? 1 : 0;
+  const PlacedObstacles at =
+      rests ? obstacles_after(model, share, share) : obstacles_over(model, solver.time(), stage);
+  SlipMeasure slip;
+  if (penalty.rubs()) {
+    // Where the search for rest is not known any more, friction is none.
+    slip = slip_of_stage(rests ? 0 : stage, state.displacement, state.velocity);
+  }
+  penalty.linearise(at, state.displacement, slip, [&] {
     std::vector<Mat3d> gradient;
     backend.displacement_gradients(gradient);
     return gradient;
@@ -67,8 +75,9 @@ std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver
                                         const State& state) {
   std::vector<double> depths(model.obstacles.size());
   if (depths.empty()) return depths;
+  const double share = solver.steps() > 0 ? 1 : 0;
   const PlacedObstacles after = solver.method() == Method::equilibrium
-                                    ? obstacles_after(model, solver.steps() > 0 ? 1 : 0)
+                                    ? obstacles_after(model, share, share)
                                     : PlacedObstacles{};
   const std::vector<LayerGroup> groups = groups_of(model, model.contact);
   const PlacedLayer layer(model, groups, [&](Index i) { return state.displacement[i]; });

@@ -15,7 +15,8 @@
 namespace phyxel {
 namespace {
 
-constexpr double on_the_way = 1e-2;  // residual at which the next stage begins
+constexpr double on_the_way = 1e-2;     // residual at which the next stage begins
+constexpr double share_of_depth = 0.1;  // of `SlipMeasure`
 
 /// Returns a balance with gravity and loads at full size, and with targets unset.
 Balance whole_balance(const Model& model, const Newton& newton) {
@@ -132,16 +133,19 @@ int stage_of(const Model& model, const OwnedVectors& vectors, Balance balance, i
   return stages;
 }
 
-[[noreturn]] void say_not_found(const Model& model, const Equilibrium& found,
+[[noreturn]] void say_not_found(const Model& model, const Newton& newton, const Equilibrium& found,
                                 const NewtonReport& report, double tolerance) {
   const std::string why = fmt::format(
       "no equilibrium was found in {} steps of Newton's method and {} evaluations of the forces "
       "({}): the residual force is {:.2g} of what is applied, {:.2g} is needed; nothing may hold a "
-      "part of the body{}, or it buckles: allowed are more support, smaller loads, or a run in "
+      "part of the body{}{}, or it buckles: allowed are more support, smaller loads, or a run in "
       "time "
       "with damping",
       found.steps, found.evaluations, report.why, report.residual, tolerance,
-      touches(model) ? ", or it does not touch yet what is to hold it" : "");
+      touches(model) ? ", or it does not touch yet what is to hold it" : "",
+      newton.contact().rubs() ? ", or it slides: friction holds no more than its coefficient times "
+                                "what presses"
+                              : "");
   if (model.share) throw AgreedError(ExitCode::diverged, why);
   throw DivergedError(why);
 }
@@ -169,7 +173,13 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
       options.start ? stage_of(model, vectors, balance, stages, found.state.displacement) : 1;
   for (int stage = first; stage <= stages; ++stage) {
     set_targets(model, static_cast<double>(stage) / stages, balance);
-    balance.obstacles = obstacles_after(model, static_cast<double>(stage) / stages);
+    balance.obstacles = obstacles_after(model, static_cast<double>(stage) / stages,
+                                        static_cast<double>(stage - 1) / stages);
+    if (newton.contact().rubs()) {
+      // A search that goes on in its first stage counts slips from rest, as it has begun.
+      balance.slip = {.from = stage == 1 ? vectors.make() : found.state.displacement,
+                      .share = share_of_depth};
+    }
     const bool last = stage == stages;
     const double tolerance = last ? options.tolerance : std::max(options.tolerance, on_the_way);
     report = newton.solve(balance, tolerance, found.state.displacement);
@@ -187,7 +197,13 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
                       "residual force of {:.2g} of what is applied, {:.2g} is needed",
                       found.steps, report.residual, options.tolerance));
     }
-    say_not_found(model, found, report, tolerance);
+    say_not_found(model, newton, found, report, tolerance);
+  }
+  if (newton.contact().rubs()) {
+    StepSums rates(ContactTerms::count * touching_count(model));
+    newton.contact().add_to(balance.obstacles, found.state.displacement, found.state.velocity, 1,
+                            rates);
+    found.contact = words_of(std::move(rates));
   }
   found.residual = report.residual;
   vectors.refresh_ghosts(found.state.displacement);

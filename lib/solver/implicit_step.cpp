@@ -14,8 +14,17 @@ namespace {
 constexpr double tolerance = 1e-8;
 constexpr int most_newton_steps = 100;
 const double share_of_step = 1 - std::sqrt(0.5);  // γ
+constexpr double share_of_depth = 1e-3;           // of `SlipMeasure`
 
 }  // namespace
+
+double stage_of_step(double dt) { return share_of_step * dt; }
+
+SlipMeasure slip_of_stage(double span, const std::vector<Vec3d>& u, const std::vector<Vec3d>& v) {
+  SlipMeasure slip{.from = u, .share = share_of_depth, .ahead = u};
+  for (std::size_t i = 0; i < u.size(); ++i) slip.from[i] -= span * v[i];
+  return slip;
+}
 
 ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
     : model_(model),
@@ -39,8 +48,8 @@ ImplicitStep::ImplicitStep(const Model& model, Backend& backend)
 
 /// The stage u' = U + s v', v' = V + s (f(u')/m - c v'): substituting v' in the first equation
 /// leaves a balance with inertia m (1 + c s) / s² about U + s V / (1 + c s).
-ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vector& from, Vector& u,
-                                              Vector& v) {
+ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vector& from,
+                                              const Vector& moving, Vector& u, Vector& v) {
   const OwnedVectors& vectors = newton_.vectors();
   newton_.set_applied(time, balance_);
   prescribe_displacements(model_, time, balance_.target);
@@ -50,6 +59,10 @@ ImplicitStep::Vector ImplicitStep::take_stage(double time, double s, const Vecto
     balance_.centre[i] = from[i] + (s / slowed(i)) * v[i];
   });
   balance_.obstacles = obstacles_over(model_, time, s);
+  if (newton_.contact().rubs()) {
+    vectors.for_each([&](Index i) { u[i] = from[i] + s * moving[i]; });
+    balance_.slip = {.from = from, .share = share_of_depth, .ahead = u};
+  }
   const Vector inner = newton_.inner_forces(u);
   balance_.scale = std::sqrt(vectors.product(inner, inner)) + std::sqrt(vectors.sum([&](Index i) {
                      const Vec3d force =
@@ -114,7 +127,7 @@ void ImplicitStep::take(State& state) {
 
 void ImplicitStep::take_both_stages(State& state) {
   const OwnedVectors& vectors = newton_.vectors();
-  const double dt = state.dt, s = share_of_step * dt, rest = dt - s;
+  const double dt = state.dt, s = stage_of_step(dt), rest = dt - s;
   const double begin = static_cast<double>(state.step) * dt;
   const double end = static_cast<double>(state.step + 1) * dt;
   const Vector u = state.displacement, v = state.velocity;
@@ -123,22 +136,25 @@ void ImplicitStep::take_both_stages(State& state) {
   Vector first_force;
   if (state.step == 0 && sums_of_motions(model_) > 0) {
     newton_.set_applied(begin, balance_);
-    balance_.obstacles = obstacles_over(model_, begin, 0);
+    const bool rubs = newton_.contact().rubs();
+    balance_.obstacles = obstacles_over(model_, begin, rubs ? s : 0);
+    if (rubs) balance_.slip = slip_of_stage(s, u, v);
     first_force = newton_.acting_forces(balance_, u);
   }
   backend_.set_history_interval(s);
-  take_stage(begin + s, s, u, u2, v2);
+  take_stage(begin + s, s, u, v, u2, v2);
   add_contact(u2, v2, rest, support_work_);
   // The start extrapolates the velocity and acceleration of the first stage over the rest of the
   // step.
   Vector from = vectors.make();
+  const Vector moving = newton_.contact().rubs() ? v2 : Vector{};
   vectors.for_each([&](Index i) {
     const Vec3d acceleration = (1 / s) * (v2[i] - v[i]);
     from[i] = u[i] + rest * v2[i];
     v2[i] = v[i] + rest * acceleration;
   });
   backend_.set_history_interval(dt);
-  Vector force = take_stage(end, s, from, u2, v2);
+  Vector force = take_stage(end, s, from, moving, u2, v2);
   add_contact(u2, v2, s, support_work_);
   end_contact_ = no_step_sums(model_);
   add_contact(u2, v2, 1, end_contact_);

@@ -7,6 +7,14 @@
 
 namespace phyxel {
 
+/// The length of each of the two stages of an implicit step of `dt` [s].
+double stage_of_step(double dt);
+
+/// What slip is at the end of a stage of `span` [s]. Points that stick creep: their slip in a stage
+/// is up to a thousandth of the depth to which the same pressure pushes them.
+/// @param u,v displacements [m] and velocities [m/s] at the end of the stage
+SlipMeasure slip_of_stage(double span, const std::vector<Vec3d>& u, const std::vector<Vec3d>& v);
+
 /// Steps of the singly diagonal Runge–Kutta method of Alexander 1977 (Diagonally implicit
 /// Runge–Kutta methods for stiff O.D.E.'s, equation for two stages): of second order and L-stable,
 /// so that oscillations much faster than a step are damped out. Each of the two stages is a balance
@@ -42,10 +50,12 @@ class ImplicitStep {
  private:
   using Vector = Newton::Vector;
   /// Takes a stage of length s [s] that ends at `time` [s].
-  /// @param from U of the stage [m]. @param u start of the search; receives u' [m]. @param v V of
-  /// the stage; receives v' [m/s]
+  /// @param from U of the stage [m]. @param moving velocities before the stage, of the slips from
+  /// which a search with friction starts [m/s]. @param u start of other searches; receives u' [m].
+  /// @param v V of the stage; receives v' [m/s]
   /// @returns all forces but those of supports at u' [N]
-  Vector take_stage(double time, double s, const Vector& from, Vector& u, Vector& v);
+  Vector take_stage(double time, double s, const Vector& from, const Vector& moving, Vector& u,
+                    Vector& v);
   void take_both_stages(State& state);
   /// Adds the work of supports at an instant.
   void add_support_work(const SupportInstant& now);

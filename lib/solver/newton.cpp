@@ -19,6 +19,7 @@ constexpr double inner_tolerance = 1e-3;
 constexpr int most_inner = 50'000;
 // Limit of conjugate gradient iterations per unknown; in exact arithmetic one per unknown suffices.
 constexpr int most_inner_share = 10;
+constexpr double careful_above = 1e-3;   // residual (`ContactPenalty::be_careful`)
 constexpr int most_exhausted = 3;        // steps in a row whose linear equations stay unsolved
 constexpr int most_without_gain = 50;    // steps that hardly reduce the smallest residual
 constexpr double rounding_share = 1e-6;  // times the tolerance: a few units of rounding
@@ -78,10 +79,12 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
     Vector all = with_contact(balance, u, force);
     report.residual = residual(balance, u, all);
     report.evaluations = evaluations_;
+    contact_.be_careful(report.residual > careful_above);
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
     report.found = report.residual <= tolerance && to_move == 0;
-    if (report.found) return report;
+    if (report.found && !contact_.begin_sliding()) return report;
+    if (report.found) smallest = std::numeric_limits<double>::infinity();
     const bool gained = to_move > 0 || report.residual < 0.9 * smallest;
     smallest = std::min(smallest, report.residual);
     without_gain = gained ? 0 : without_gain + 1;
@@ -185,7 +188,7 @@ Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
 /// Call it where the backend has the displacements u.
 void Newton::linearise_contact(const Balance& balance, const Vector& u) {
   if (contact_.empty()) return;
-  contact_.linearise(balance.obstacles, u, [&] {
+  contact_.linearise(balance.obstacles, u, balance.slip, [&] {
     std::vector<Mat3d> gradient;
     backend_.displacement_gradients(gradient);
     ++evaluations_;

@@ -33,6 +33,7 @@ struct Balance {
   std::vector<double> weight;  ///< Inertia [kg/s²], shape [n]; empty without inertia.
   Vector centre;               ///< Displacement that inertia alone leads to [m]; empty likewise.
   PlacedObstacles obstacles;   ///< At the time of the balance.
+  SlipMeasure slip;            ///< Of contact with friction.
   double time = 0;             ///< Time of loads that follow the surface and grow [s].
   double scale = 0;  ///< Force added to the applied forces as the reference of residuals [N].
 };

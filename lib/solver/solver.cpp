@@ -66,16 +66,15 @@ void check_times(const State& state) {
   }
 }
 
-/// Refuses friction and restitution to methods that do not know them.
-void refuse_contact(const Model& model, Method method) {
+/// Refuses restitution to methods by penalties.
+void refuse_restitution(const Model& model, Method method) {
   const auto check = [&](const ContactLaw& law, const std::string& section,
                          const std::string& of_what) {
-    const bool rubs = law.static_friction > 0;
-    const double found = rubs ? law.static_friction : law.restitution;
-    if (!(found > 0)) return;
+    if (!(law.restitution > 0)) return;
     const std::string why = fmt::format(
-        "{}.{} = {:g}{} found with solver.method = \"{}\"; allowed with this method: 0", section,
-        rubs ? "friction" : "restitution", found, of_what, method_name(method));
+        "{}.restitution = {:g}{} found with solver.method = \"{}\"; allowed with this method: 0, "
+        "since its contact is elastic and has no impacts in which a surface could lose speed",
+        section, law.restitution, of_what, method_name(method));
     if (model.share) throw AgreedError(ExitCode::bad_input, why);
     throw InputError(why);
   };
@@ -116,7 +115,7 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
-  if (method != Method::verlet) refuse_contact(model, method);
+  if (method != Method::verlet) refuse_restitution(model, method);
   const std::size_t words = words_of(no_step_sums(model)).size();
   if (!start.step_sums.empty() && start.step_sums.size() != words) {
     throw InputError(
@@ -185,6 +184,8 @@ void Solver::step_by_newton() {
           *model_, backend_,
           {.observer = observer_, .start = begun_ ? &start.displacement : nullptr});
       rest_ = {found.evaluations, found.steps, found.residual};
+      rest_contact_.clear();
+      add_words(rest_contact_, found.contact);
       break;
     }
   }
@@ -209,7 +210,7 @@ std::span<const Vec3d> Solver::end_force() const {
 }
 
 std::span<const ExactSum> Solver::end_contact() const {
-  if (!implicit_) return {};
+  if (!implicit_) return rest_contact_;
   return implicit_->end_contact();
 }
 

@@ -42,13 +42,18 @@ struct Equilibrium {
   double residual = 0;           ///< Relative residual at the end.
   int steps = 0;                 ///< Newton steps taken.
   std::int64_t evaluations = 0;  ///< Evaluations of the forces of all phyxels.
+  /// What each obstacle and body would do in a second, on the phyxels of this rank, as words of
+  /// exact sums (`ContactTerms`); empty without friction, where it follows from the state.
+  std::vector<std::int64_t> contact = {};
 };
 
 /// Finds a state in which the forces on each free phyxel vanish, under gravity, full loads, and
 /// prescribed displacements at their ends. Newton's method starts at rest; its equations are solved
 /// by conjugate gradients with differences of the backend's forces, so that all terms are included
 /// and no matrix is formed. Steps are shortened if they would strain the body strongly or increase
-/// its energy, so that of several equilibria a stable one near the path is found.
+/// its energy, so that of several equilibria a stable one near the path is found. Friction is that
+/// of slips since the start of the search, or since each stage of it where obstacles or supports
+/// move far.
 /// @param backend backend of the model in double; receives the state found
 /// @throws InputError if the backend is not in double, a motion has no end, or a body is not
 ///   supported against its loads; DivergedError, with the residual, if no equilibrium is found

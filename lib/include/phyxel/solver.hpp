@@ -154,8 +154,8 @@ class Solver {
   /// before the first one, for other methods, and without supports.
   std::span<const Vec3d> end_force() const;
   /// What the obstacles would do to the phyxels of this rank in a second at the end of the last
-  /// implicit step, as exact sums (`ContactTerms`); empty before the first one, and for other
-  /// methods.
+  /// implicit step, or where a search has found rest with friction, as exact sums (`ContactTerms`);
+  /// empty before that, and for other methods.
   std::span<const ExactSum> end_contact() const;
   /// Sums over all steps since t = 0 and all ranks, as words of exact sums. First the work [J] that
   /// the support of each motion has done, shape [motions, words]; none if no support moves. Then
@@ -182,8 +182,9 @@ class Solver {
   std::unique_ptr<ImplicitStep> implicit_;
   State implicit_state_;
   NewtonObserver observer_;
-  bool begun_ = false;  ///< The start is that of an interrupted search for rest.
-  SolverWork rest_;     ///< Of the search for rest.
+  bool begun_ = false;                  ///< The start is that of an interrupted search for rest.
+  SolverWork rest_;                     ///< Of the search for rest.
+  std::vector<ExactSum> rest_contact_;  ///< Of `end_contact`, after a search for rest.
   // Work of supports, as words: that of the start, of all ranks; that of the backend before this
   // solver began; and corrections where the step changed, the last two of this rank.
   std::vector<std::int64_t> work_before_, work_of_backend_, work_of_changes_;

@@ -254,9 +254,8 @@ TEST(Contacts, AtRestAndInImplicitStepsAreThoseOfExplicitOnes) {
 
 TEST(Contacts, OfImplicitStepsMakeAllChangesOfMomentum) {
   std::string text = corner() + "[solver]\nmethod = 'implicit'\nprecision = 'double'\n";
-  for (const std::string key : {"friction = 0.4\nrestitution = 0.3\n", "friction = 0.2\n"}) {
-    text.replace(text.find(key), key.size(), "");
-  }
+  const std::string key = "restitution = 0.3\n";
+  text.replace(text.find(key), key.size(), "");
   Way way(text, 0.01);
   way.solver.step(30);
   Vec3d expected = way.mass() * (0.3 * way.model.gravity + Vec3d{1, 0, -1});

@@ -304,6 +304,11 @@ struct SurfaceForce {
   Vec3<double> tangential;  ///< On the point.
   Vec3<double> twist;       ///< Couples of friction: b = height T⁺ tangential [N/m].
 
+  /// Sets friction on the point, and its couple.
+  PHYXEL_HD void set_friction(const SurfaceTouch& touch, Vec3<double> force) {
+    tangential = force;
+    twist = touch.height * (touch.inverse_spread * force);
+  }
   /// The reaction on a phyxel of the body's surface to the normal part.
   PHYXEL_HD Vec3<double> normal_reaction(const SurfaceTouch& touch,
                                          const SurfaceShare& share) const {
@@ -329,8 +334,7 @@ PHYXEL_HD void add_friction(const SurfaceTouch& touch, const SurfaceResponse& re
   if (!(sideways > 0)) return;
   const double stop = speed / sideways, hold = law.kinetic_friction * force.push;
   const double size = stop <= law.static_friction * force.push || stop < hold ? stop : hold;
-  force.tangential = -size * way;
-  force.twist = touch.height * (touch.inverse_spread * force.tangential);
+  force.set_friction(touch, -size * way);
 }
 
 /// The force that gives a point its target velocity w, and Coulomb's friction,
