@@ -10,7 +10,7 @@ namespace phyxel {
 namespace {
 
 constexpr int most_sweeps = 1000;
-constexpr double tolerance = 1e-11;  // of velocities
+constexpr double tolerance = 1e-9;  // of velocities
 
 Mat3d turned(const Mat3d& turn, const Sym3d& s) {
   const Mat3d whole{{{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}}};

@@ -308,6 +308,25 @@ TEST_F(ContactsOfRuns, ArmsOfAHorseshoeClapAndKeepBothMomenta) {
   }
 }
 
+TEST_F(ContactsOfRuns, DiceComeToRestOnOneOfTheirFaces) {
+  const json summary = summary_of("dice");
+  ASSERT_EQ(summary["rigid_bodies"].size(), 3u);
+  for (const json& die : summary["rigid_bodies"]) {
+    const std::string name = die["obstacle"];
+    // A face on the table, whose middle is half an edge above it.
+    EXPECT_NEAR(die["place_m"][2].get<double>(), 0.01, 1e-5) << name;
+    for (const json& speed : die["velocity_m_s"]) EXPECT_LT(std::abs(speed.get<double>()), 1e-3);
+    const std::vector<double> x =
+        values(fs::path("dice") / "rigid.csv", "place_x", "," + name + ",");
+    // They have met the cushion, which begins at 0.185 m, and have come back from it.
+    const double farthest = *std::max_element(x.begin(), x.end());
+    EXPECT_GT(farthest, 0.15) << name;
+    EXPECT_LT(farthest, 0.185) << name;
+    EXPECT_LT(x.back(), farthest) << name;
+  }
+  EXPECT_GT(column("dice", "first die", "impulse_x").back(), 0);  // on the cushion
+}
+
 TEST_F(ContactsOfRuns, ABallThatSlidesBeginsToRollAtFiveSeventhsOfItsSpeed) {
   const std::string scene = text_of(example_file("skittles"));
   const std::string skittles = scene.substr(scene.find("[[body]]\nname = \"skittle\""));

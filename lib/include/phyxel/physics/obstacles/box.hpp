@@ -38,7 +38,10 @@ struct BoxObstacle {
     for (int i = 0; i <= parts; ++i) {
       for (int j = 0; j <= parts; ++j) {
         for (int k = 0; k <= parts; ++k) {
-          if (i % parts != 0 && j % parts != 0 && k % parts != 0) continue;  // not on a face
+          const int inner = (i % parts != 0) + (j % parts != 0) + (k % parts != 0);
+          const int middle = (2 * i == parts) + (2 * j == parts) + (2 * k == parts);
+          // Corners, edges, and the middle of each face.
+          if (inner == 3 || (inner == 2 && middle != 2)) continue;
           const auto at = [](int n, double size) { return (n / double{parts} - 0.5) * size; };
           each(Vec3d{at(i, size_x), at(j, size_y), at(k, size_z)}, 0.0);
         }

@@ -1,0 +1,38 @@
+/// Free rigid bodies on several ranks under mpirun.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "mpirun.hpp"
+
+namespace phyxel {
+namespace {
+
+using test::Outcome;
+using ::testing::HasSubstr;
+
+TEST_F(Mpirun, FreeBodiesMoveTheSameOnAllRanks) {
+  // A ball falls on a block, which rests on a floor, beside its middle; a die falls beside it.
+  write("scene.toml",
+        "gravity = [0, 0, -9.81]\n[time]\nend = 0.25\n[solver]\nprecision = 'double'\n"
+        "[output]\nframes_per_second = 50\n"
+        "[[obstacle]]\nname = 'floor'\nshape = 'plane'\ntranslation = [0, 0, -0.1]\n"
+        "friction = 0.5\n"
+        "[[obstacle]]\nname = 'ball'\nshape = 'sphere'\nradius = 0.05\ndensity = 7800\n"
+        "friction = 0.3\ntranslation = [0.05, 0.02, 0.2]\nspin = [0, 10, 0]\n"
+        "[[obstacle]]\nname = 'die'\nshape = 'box'\nsize = [0.04, 0.04, 0.04]\ndensity = 2000\n"
+        "friction = 0.3\ntranslation = [0.2, 0, -0.03]\nrotation = [20, 10, 0]\n"
+        "[[body]]\nname = 'block'\nshape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.04\n"
+        "lattice = 'nodes'\n[body.material]\nyoung = 1e6\npoisson = 0.3\ndensity = 1000\n");
+  const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  EXPECT_THAT(test::text_of(folder_ / "alone" / "rigid.csv"), HasSubstr(",die,box,"));
+  for (const int ranks : {2, 3}) {
+    const std::string other = "on" + std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "scene.toml", "--out", other});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    expect_same_files("alone", other);
+  }
+}
+
+}  // namespace
+}  // namespace phyxel
