@@ -73,7 +73,7 @@ std::vector<Vec3d> forces_on_supports(const Model& model, Backend& backend, cons
     BodyPenalty penalty(model);
     std::vector<Mat3d> gradient;
     backend.displacement_gradients(gradient);
-    penalty.linearise(state.displacement, gradient);
+    penalty.linearise(state.displacement, SlipMeasure{}, gradient);
     penalty.add(state.displacement, all);
   }
   return all;
