@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 #include <map>
 #include <string>
@@ -46,27 +45,48 @@ __global__ void copy_places(Fields<Real, StateReal> f, const Index* place,
   if (k < count) now[k] = position[k] + displacement_at(f, place[k]);
 }
 
-/// Finds how far the phyxels of the layer have moved, and how fast they are: the bits of the
-/// largest squares [m², m²/s²], which are in the order of the numbers. One thread per phyxel.
+/// Finds the boxes of the ways of the phyxels of each group of the layer since points were found,
+/// and of their velocities: the lowest numbers of both [m, m/s], then the highest ones. One block
+/// of `tile_size` threads per group.
 template <class Real, class StateReal>
-__global__ void find_moved(Fields<Real, StateReal> f, const Index* place,
-                           const Vec3<double>* position, const Vec3<double>* found,
-                           unsigned long long* squares, int count) {
-  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  double of_way = 0, of_speed = 0;
-  if (k < count) {
+__global__ void find_ways(Fields<Real, StateReal> f, const Index* place,
+                          const Vec3<double>* position, const Vec3<double>* found,
+                          const Index* begin, const Index* end, double* ways) {
+  constexpr int numbers = 6;
+  double low[numbers], high[numbers];
+  for (int n = 0; n < numbers; ++n) {
+    low[n] = HUGE_VAL;
+    high[n] = -HUGE_VAL;
+  }
+  for (Index k = begin[blockIdx.x] + static_cast<Index>(threadIdx.x); k < end[blockIdx.x];
+       k += static_cast<Index>(blockDim.x)) {
     const Vec3<double> way = position[k] + displacement_at(f, place[k]) - found[k];
-    const Vec3<double> velocity = to<double>(column3(f.velocity, f.places, place[k]));
-    of_way = dot(way, way);
-    of_speed = dot(velocity, velocity);
+    const Vec3<double> speed = to<double>(column3(f.velocity, f.places, place[k]));
+    const double all[] = {way.x, way.y, way.z, speed.x, speed.y, speed.z};
+    for (int n = 0; n < numbers; ++n) {
+      low[n] = fmin(low[n], all[n]);
+      high[n] = fmax(high[n], all[n]);
+    }
   }
-  for (int lanes = 16; lanes > 0; lanes /= 2) {
-    of_way = fmax(of_way, __shfl_down_sync(0xffffffff, of_way, lanes));
-    of_speed = fmax(of_speed, __shfl_down_sync(0xffffffff, of_speed, lanes));
+  __shared__ double of_warp[2 * numbers][tile_size / 32];
+  const unsigned warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+  for (int n = 0; n < numbers; ++n) {
+    for (int lanes = 16; lanes > 0; lanes /= 2) {
+      low[n] = fmin(low[n], __shfl_down_sync(0xffffffff, low[n], lanes));
+      high[n] = fmax(high[n], __shfl_down_sync(0xffffffff, high[n], lanes));
+    }
+    if (lane != 0) continue;
+    of_warp[n][warp] = low[n];
+    of_warp[numbers + n][warp] = high[n];
   }
-  if (threadIdx.x % 32 != 0) return;
-  atomicMax(squares, static_cast<unsigned long long>(__double_as_longlong(of_way)));
-  atomicMax(squares + 1, static_cast<unsigned long long>(__double_as_longlong(of_speed)));
+  __syncthreads();
+  if (threadIdx.x >= 2 * numbers) return;
+  double most = of_warp[threadIdx.x][0];
+  for (int w = 1; w < tile_size / 32; ++w) {
+    const double other = of_warp[threadIdx.x][w];
+    most = threadIdx.x < numbers ? fmin(most, other) : fmax(most, other);
+  }
+  ways[2 * numbers * blockIdx.x + threadIdx.x] = most;
 }
 
 /// Sets what is known of points at the start of a step. One thread per point.
@@ -200,6 +220,7 @@ class DeviceBodyContacts {
   explicit DeviceBodyContacts(DeviceModel<Real, StateReal>& model)
       : m_(model),
         points_(model.model()),
+        watch_(model.model(), 1, 4),
         pushes_(has_body_penalties(model.model())),
         rubs_(pushes_ && has_body_friction(model.model().body_contact)) {
     if (!acts()) return;
@@ -219,7 +240,14 @@ class DeviceBodyContacts {
     for (const Index i : contact.layer.phyxels) positions.push_back(m_.model().position[i]);
     layer_position_ = sent(positions, name);
     layer_found_ = {positions.size(), name};
-    squares_ = sent(std::vector<unsigned long long>(2), name);
+    std::vector<Index> begin, end;
+    for (const LayerGroup& group : watch_.groups()) {
+      begin.push_back(static_cast<Index>(group.begin));
+      end.push_back(static_cast<Index>(group.end));
+    }
+    group_begin_ = sent(begin, name);
+    group_end_ = sent(end, name);
+    ways_ = {12 * begin.size(), name};
     const std::size_t bodies = contact.distances.size();
     const auto accumulators = static_cast<unsigned>(std::clamp<std::size_t>(256 / bodies, 2, 128));
     sums_ = DeviceSums(static_cast<int>(bodies) * ContactTerms::count, accumulators, name);
@@ -270,10 +298,11 @@ class DeviceBodyContacts {
   std::size_t bytes() const {
     if (!acts()) return 0;
     std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() +
-                        layer_found_.bytes() + sums_.bytes() + site_.bytes() + motion_.bytes() +
-                        velocity_.bytes() + response_.bytes() + rows_.bytes() + near_.bytes() +
-                        carries_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
-                        forces_.bytes() + gradients_.bytes() + regain_.bytes() + modulus_.bytes();
+                        layer_found_.bytes() + ways_.bytes() + sums_.bytes() + site_.bytes() +
+                        motion_.bytes() + velocity_.bytes() + response_.bytes() + rows_.bytes() +
+                        near_.bytes() + carries_.bytes() + touch_.bytes() + force_.bytes() +
+                        share_.bytes() + forces_.bytes() + gradients_.bytes() + regain_.bytes() +
+                        modulus_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -325,24 +354,35 @@ class DeviceBodyContacts {
   /// Finds the points that may touch anew if phyxels have moved far enough.
   void look(double dt) {
     const int count = static_cast<int>(layer_place_.size());
-    double moved = 0, fastest = 0;
-    if (watch_.generation() > 0) {
-      PHYXEL_CUDA(cudaMemsetAsync(squares_.data(), 0, squares_.bytes(), m_.stream()));
-      m_.launch_each("find_moved", find_moved<Real, StateReal>, count, m_.fields(),
-                     layer_place_.data(), layer_position_.data(), layer_found_.data(),
-                     squares_.data(), count);
-      m_.wait();
-      const std::vector<unsigned long long> bits = fetched(squares_);
-      moved = std::sqrt(std::bit_cast<double>(bits[0]));
-      fastest = std::sqrt(std::bit_cast<double>(bits[1]));
-    }
-    if (!watch_.look(m_.model(), moved, fastest, points_.skin(), dt)) return;
+    if (!watch_.is_late_by(ways_now(), dt, points_.skin())) return;
     m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
                    layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
     m_.wait();
-    points_.find(fetched(layer_found_), dt);
+    std::vector<Vec3d> places = fetched(layer_found_);
+    points_.find(places, dt);
+    watch_.found(std::move(places), points_.skin());
     send_points();
     if (pushes_) send_penalties(dt);
+  }
+  /// The ways of the groups of the layer since points were found; none before that.
+  std::vector<SurfaceWay> ways_now() {
+    std::vector<SurfaceWay> ways(watch_.groups().size());
+    if (watch_.generation() == 0 || ways.empty()) return ways;
+    const auto blocks = static_cast<unsigned>(ways.size());
+    find_ways<<<blocks, tile_size, 0, m_.stream()>>>(
+        m_.fields(), layer_place_.data(), layer_position_.data(), layer_found_.data(),
+        group_begin_.data(), group_end_.data(), ways_.data());
+    m_.launched("find_ways", blocks, tile_size);
+    m_.wait();
+    const std::vector<double> numbers = fetched(ways_);
+    const auto vector = [&](std::size_t first) {
+      return Vec3d{numbers[first], numbers[first + 1], numbers[first + 2]};
+    };
+    for (std::size_t g = 0; g < ways.size(); ++g) {
+      const std::size_t first = 12 * g;
+      ways[g] = {{vector(first), vector(first + 6)}, {vector(first + 3), vector(first + 9)}};
+    }
+    return ways;
   }
   void send_points() {
     const Model& model = m_.model();
@@ -462,16 +502,17 @@ class DeviceBodyContacts {
 
   DeviceModel<Real, StateReal>& m_;
   TouchingPoints points_;
+  LayerWatch watch_;
   bool pushes_;  // true if bodies act by penalties
   bool rubs_;    // true if some of these have friction
-  ContactWatch watch_{4};
   double dt_ = 0;  // [s]
   DeviceSums sums_;
   std::vector<DeviceDistances> distances_;  // of bodies that are no copies of each other
   DeviceArray<PlacedDistances> fields_;
   DeviceArray<Index> layer_place_;
   DeviceArray<Vec3<double>> layer_position_, layer_found_;
-  DeviceArray<unsigned long long> squares_;
+  DeviceArray<Index> group_begin_, group_end_;  // groups of the layer
+  DeviceArray<double> ways_;                    // of these groups
   // Of this device's points.
   DeviceArray<Index> place_, body_, entry_, tiles_;
   DeviceArray<Vec3<double>> position_, centre_;

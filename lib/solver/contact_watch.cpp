@@ -51,10 +51,11 @@ bool ContactWatch::look(const Model& model, double moved, double fastest, double
   return is_late;
 }
 
-LayerWatch::LayerWatch(const Model& model, int threads)
+LayerWatch::LayerWatch(const Model& model, int threads, int rarest)
     : model_(model),
       groups_(groups_of(model, model.body_contact.layer)),
       threads_(std::clamp(static_cast<int>(layer().size() / 4000), 1, threads)),
+      watch_(rarest),
       ways_(groups_.size()) {}
 
 bool LayerWatch::is_late_on_ranks(double dt, double skin) {
@@ -69,14 +70,16 @@ bool LayerWatch::is_late_on_ranks(double dt, double skin) {
 bool LayerWatch::is_late_here(double dt, double skin) {
   const bool is_late = !watch_.has_found(dt) || have_come_near(dt, skin);
   if (is_late) watch_.renew(dt);
+  watch_.put_off();
   return is_late;
 }
 
-// Within a step, the speeds of bodies against each other may double.
+// Until the next look, the speeds of bodies against each other may double.
 bool LayerWatch::have_come_near(double dt, double skin) const {
-  std::vector<Box> ways(boxes_.size(), no_box);  // up to the end of the step
+  std::vector<Box> ways(boxes_.size(), no_box);  // up to the next look
+  const double span = watch_.rarest() * dt;
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    const Box way = sum_of(ways_[g].moved, ways_[g].speeds, 2 * dt);
+    const Box way = sum_of(ways_[g].moved, ways_[g].speeds, 2 * span);
     Box& of_body = ways[part_of(model_, layer()[groups_[g].begin]).body];
     extend(of_body, way.low);
     extend(of_body, way.high);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "model/box.hpp"
@@ -35,6 +36,10 @@ class ContactWatch {
     ++generation_;
     dt_ = dt;
   }
+  /// Puts the next look off as long as that may be.
+  void put_off() { left_ = rarest_; }
+  /// Most steps between two looks.
+  int rarest() const { return rarest_; }
   /// How often they had to be.
   std::int64_t generation() const { return generation_; }
 
@@ -51,14 +56,25 @@ struct SurfaceWay {
   Box speeds = no_box;  ///< Box of their velocities [m/s].
 };
 
-/// Watches the layer of a model on the host, in each step: what comes to bodies at rest may set
-/// them in motion in any step. Bodies that move together need no new points, however fast they are,
-/// nor do bodies far from each other.
+/// Watches the layer of a model, in each step on the host, every few steps on a device: what comes
+/// to bodies at rest may set them in motion in any step. Bodies that move together need no new
+/// points, however fast they are, nor do bodies far from each other.
 class LayerWatch {
  public:
   /// @param model must outlive this. @param threads most threads that share the work
-  LayerWatch(const Model& model, int threads);
+  /// @param rarest most steps between two looks (`ContactWatch`)
+  LayerWatch(const Model& model, int threads, int rarest = 1);
 
+  /// The groups of the layer, in its order.
+  const std::vector<LayerGroup>& groups() const { return groups_; }
+  /// True if it is time to look where phyxels are, before a step of `dt` [s].
+  bool is_due(double dt) { return watch_.is_due(dt); }
+  /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
+  /// @param ways of the groups since points were found; not looked at before that
+  bool is_late_by(std::vector<SurfaceWay> ways, double dt, double skin) {
+    ways_ = std::move(ways);
+    return model_.share ? is_late_on_ranks(dt, skin) : is_late_here(dt, skin);
+  }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param skin as of `TouchingPoints` [m]. @param state_of returns the state of a phyxel
   template <class StateOf>
@@ -76,7 +92,7 @@ class LayerWatch {
         ways_[g] = way;
       }
     }
-    return model_.share ? is_late_on_ranks(dt, skin) : is_late_here(dt, skin);
+    return is_late_by(std::move(ways_), dt, skin);
   }
   /// Notes the places at which points are found [m], shape [layer].
   void found(std::vector<Vec3d> position, double skin);
@@ -94,7 +110,7 @@ class LayerWatch {
   const Model& model_;
   std::vector<LayerGroup> groups_;
   int threads_;
-  ContactWatch watch_{1};
+  ContactWatch watch_;
   std::vector<Vec3d> found_at_;   // [m], shape [layer]
   std::vector<SurfaceWay> ways_;  // of each group
   // Of each body of the scene: its box when points were found, grown by the ranges of its phyxels,
