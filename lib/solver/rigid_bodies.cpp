@@ -120,10 +120,16 @@ std::vector<RigidReading> read_rigid_bodies(const Model& model, const Backend& b
                                             const Solver& solver) {
   std::vector<RigidReading> readings;
   const std::vector<RigidState> states = backend.rigid_states();
+  if (states.empty()) return readings;
+  RigidBodies next(model);  // after the coming step
+  next.put(states, solver.dt());
+  next.begin_step(solver.time(), solver.dt());
   for (const Obstacle& obstacle : model.obstacles) {
     if (!obstacle.free) continue;
-    const RigidState now =
-        at_its_time(*obstacle.free, states.at(readings.size()), solver.now().lag * model.gravity);
+    const RigidState& after = next.states()[readings.size()];
+    RigidState now = states.at(readings.size());
+    now.velocity = 0.5 * (now.velocity + after.velocity);
+    now.angular_momentum = 0.5 * (now.angular_momentum + after.angular_momentum);
     readings.push_back({.obstacle = obstacle.name,
                         .shape = shape_name(obstacle),
                         .place = now.place,
