@@ -211,8 +211,7 @@ void bench_step(const BenchOptions& options) {
         const double dt =
             0.1 * model.neighbourhood.support[0] / pressure_wave_speed(model.parts[0].material);
         Solver solver(*backend, initial_state(model, scene, dt));
-        solver.step(1, surfels);  // what touches is found, lists and kernels are loaded
-        backend->wait();
+        solver.step(1, surfels);  // what touches is found, kernels are loaded
         const auto warm = Clock::now();
         int steps = 0;
         while (seconds_since(warm) < 0.2 * options.seconds || steps < 2) {

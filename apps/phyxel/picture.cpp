@@ -71,7 +71,8 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
     }
   }
   for (const Obstacle& obstacle : setting.obstacles) {
-    for (const auto& [time, state] : setting.paths.of(obstacle)) fit.include(std::span(&state.place, 1));
+    for (const auto& [time, state] : setting.paths.of(obstacle))
+      fit.include(std::span(&state.place, 1));
   }
   if (fit.empty()) throw InputError("the frames have no point with finite coordinates");
   const auto phyxels = read_if_any(shots.front().phyxels);

@@ -1,0 +1,209 @@
+/// The kernels by which bodies are kept out of each other on the GPU.
+#pragma once
+
+#include <cmath>
+#include <type_traits>
+
+#include "solver/contact_passes.hpp"
+#include "solver/contacts.cuh"
+#include "solver/device_model.cuh"
+#include "solver/device_sums.cuh"
+#include "solver/thread_group.cuh"
+
+namespace phyxel::cuda {
+
+/// The phyxels of this device that may touch other bodies, in device memory, shape [count] each;
+/// they are the first of the points of `ContactPasses`.
+template <class Real>
+struct SurfacePlaces {
+  const Index* place = nullptr;            ///< Tile slots.
+  const Vec3<double>* position = nullptr;  ///< At rest [m].
+  const SurfaceSite* site = nullptr;
+  const Vec3<double>* centre = nullptr;  ///< Centre of mass of their bodies, at rest [m].
+  const Index* body = nullptr;           ///< Numbers of their bodies.
+  const Index* entry = nullptr;          ///< Where their gradients are.
+  const Real* gradients = nullptr;       ///< Of displacement, shape [9, stride].
+  std::size_t stride = 0;
+  SurfaceMotion* motion = nullptr;
+  Vec3<double>* velocity = nullptr;  ///< Over the step, so far [m/s].
+  PointForces* forces = nullptr;     ///< Of all sweeps of the step.
+  int count = 0;
+};
+
+/// Copies the places of phyxels of the layer [m]. One thread per phyxel.
+template <class Real, class StateReal>
+__global__ void copy_places(Fields<Real, StateReal> f, const Index* place,
+                            const Vec3<double>* position, Vec3<double>* now, int count) {
+  const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (k < count) now[k] = position[k] + displacement_at(f, place[k]);
+}
+
+/// Finds the boxes of the ways of the phyxels of each group of the layer since points were found,
+/// and of their velocities: the lowest numbers of both [m, m/s], then the highest ones. One block
+/// of `tile_size` threads per group.
+template <class Real, class StateReal>
+__global__ void find_ways(Fields<Real, StateReal> f, const Index* place,
+                          const Vec3<double>* position, const Vec3<double>* found,
+                          const Index* begin, const Index* end, double* ways) {
+  constexpr int numbers = 6;
+  double low[numbers], high[numbers];
+  for (int n = 0; n < numbers; ++n) {
+    low[n] = HUGE_VAL;
+    high[n] = -HUGE_VAL;
+  }
+  for (Index k = begin[blockIdx.x] + static_cast<Index>(threadIdx.x); k < end[blockIdx.x];
+       k += static_cast<Index>(blockDim.x)) {
+    const Vec3<double> way = position[k] + displacement_at(f, place[k]) - found[k];
+    const Vec3<double> speed = to<double>(column3(f.velocity, f.places, place[k]));
+    const double all[] = {way.x, way.y, way.z, speed.x, speed.y, speed.z};
+    for (int n = 0; n < numbers; ++n) {
+      low[n] = fmin(low[n], all[n]);
+      high[n] = fmax(high[n], all[n]);
+    }
+  }
+  __shared__ double of_warp[2 * numbers][tile_size / 32];
+  const unsigned warp = threadIdx.x / 32, lane = threadIdx.x % 32;
+  for (int n = 0; n < numbers; ++n) {
+    for (int lanes = 16; lanes > 0; lanes /= 2) {
+      low[n] = fmin(low[n], __shfl_down_sync(0xffffffff, low[n], lanes));
+      high[n] = fmax(high[n], __shfl_down_sync(0xffffffff, high[n], lanes));
+    }
+    if (lane != 0) continue;
+    of_warp[n][warp] = low[n];
+    of_warp[numbers + n][warp] = high[n];
+  }
+  __syncthreads();
+  if (threadIdx.x >= 2 * numbers) return;
+  double most = of_warp[threadIdx.x][0];
+  for (int w = 1; w < tile_size / 32; ++w) {
+    const double other = of_warp[threadIdx.x][w];
+    most = threadIdx.x < numbers ? fmin(most, other) : fmax(most, other);
+  }
+  ways[2 * numbers * blockIdx.x + threadIdx.x] = most;
+}
+
+/// Sets what is known of points at the start of a step. One thread per point.
+template <class Real, class StateReal>
+__global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p >= s.count) return;
+  SurfaceMotion& motion = s.motion[p];
+  motion.before = s.position[p] + displacement_at(f, s.place[p]);
+  motion.earlier = to<double>(column3(f.velocity, f.places, s.place[p]));
+  Mat3<double> gradient;
+  for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + s.entry[p]];
+  set_gradient(motion, s.site[p], gradient);
+  s.forces[p] = {};
+}
+
+/// Sets where points are at the end of a step, before contact. One thread per point.
+template <class Real, class StateReal>
+__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p >= s.count) return;
+  s.motion[p].after = s.position[p] + displacement_at(f, s.place[p]);
+  s.velocity[p] = to<double>(column3(f.velocity, f.places, s.place[p]));
+}
+
+// One group of threads per row or point.
+static __global__ void find_touches(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_touch(threads, threads.number());
+}
+static __global__ void find_shares(ContactPasses passes, int points) {
+  const ThreadGroup threads;
+  if (threads.number() < points) passes.find_share(threads, threads.number());
+}
+static __global__ void find_responses(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_response(threads, threads.number());
+}
+static __global__ void find_row_forces(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_force(threads, threads.number());
+}
+static __global__ void find_row_pushes(PenaltyPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_push(threads, threads.number());
+}
+static __global__ void find_row_rubs(PenaltyPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_rub(threads, threads.number());
+}
+
+/// Changes the velocities of points by penalties as a step starts. One group of threads per point.
+/// @param regain 1 over what damping keeps of a velocity, shape [count]
+template <class Real, class StateReal>
+__global__ void push_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
+                           const double* regain) {
+  const ThreadGroup threads;
+  const int p = threads.number();
+  if (p >= s.count) return;
+  const Vec3<double> push = passes.forces_on(threads, p).normal;
+  if (!threads.is_first()) return;
+  s.forces[p].normal += push;
+  const Vec3<double> change = regain[p] * passes.change_by({push, {}}, p);
+  if (change == Vec3<double>{}) return;
+  const Index at = s.place[p];
+  set_column3(f.velocity, f.places, at,
+              to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change));
+}
+
+/// Moves points by friction at the end of a step. One group of threads per point.
+template <class Real, class StateReal>
+__global__ void rub_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
+  const ThreadGroup threads;
+  const int p = threads.number();
+  if (p >= s.count) return;
+  const Vec3<double> friction = passes.forces_on(threads, p).tangential;
+  if (!threads.is_first()) return;
+  s.forces[p].tangential += friction;
+  const Vec3<double> change = passes.change_by({{}, friction}, p);
+  if (change == Vec3<double>{}) return;
+  const Index at = s.place[p];
+  move_to(f, at, displacement_at(f, at) + passes.dt * change,
+          to<double>(column3(f.velocity, f.places, at)) + change);
+  s.velocity[p] = to<double>(column3(f.velocity, f.places, at));
+}
+
+/// Moves points by the forces on them. One group of threads per point.
+template <class Real, class StateReal>
+__global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
+  const ThreadGroup threads;
+  const int p = threads.number();
+  if (p >= s.count) return;
+  const PointForces forces = passes.forces_on(threads, p);
+  if (!threads.is_first()) return;
+  PointForces& all = s.forces[p];
+  all.normal += forces.normal;
+  all.tangential += forces.tangential;
+  const Vec3<double> change = passes.change_by(forces, p);
+  if (change == Vec3<double>{}) return;
+  const Index at = s.place[p];
+  const Vec3<StateReal> v = to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change);
+  set_column3(f.velocity, f.places, at, v);
+  const Vec3<StateReal> u = to<StateReal>(displacement_at(f, at) + passes.dt * change);
+  if constexpr (!std::is_same_v<Real, StateReal>) set_column3(f.displacement, f.places, at, u);
+  auto record = f.points.get(at);
+  record.u = to<Real>(u);
+  f.points.set(at, record);
+  s.velocity[p] = to<double>(v);
+}
+
+/// Adds what the forces of all sweeps do to the sums of the bodies. One thread per point.
+template <class Real>
+__global__ void add_contact_terms(SurfacePlaces<Real> s, double dt, SumWords sums) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  ContactTerms terms;
+  int first = 0;
+  if (p < s.count) {
+    const PointForces all = s.forces[p];
+    const SurfaceMotion& motion = s.motion[p];
+    const Vec3<double> mean = 0.5 * (motion.earlier + s.velocity[p]);
+    terms.set(dt * all.normal, dt * all.tangential, motion.before - s.centre[p], mean, mean);
+    first = s.body[p] * ContactTerms::count;
+  }
+  for (int t = 0; t < ContactTerms::count; ++t) sums.add_of_warp(first + t, p, terms.value[t]);
+}
+
+}  // namespace phyxel::cuda
