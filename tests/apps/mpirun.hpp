@@ -86,7 +86,7 @@ region = "x+"
   }
   void expect_same_files(const std::string& a, const std::string& b) const {
     const auto left = files_of(a), right = files_of(b);
-    EXPECT_GT(left.size(), 10u);
+    EXPECT_GT(left.size(), 5u);
     ASSERT_EQ(left.size(), right.size());
     for (const auto& [name, content] : left) {
       ASSERT_TRUE(right.contains(name)) << name;

@@ -271,6 +271,9 @@ frequency = 5 # obstacle.motion.frequency => frequency = 6
 [[obstacle]]
 shape = 'box'
 size = [1, 2, 3] # obstacle.size => size = [1, 2, 4]
+density = 7 # obstacle.density => density = 8
+velocity = [1, 0, 0] # obstacle.velocity => velocity = [2, 0, 0]
+spin = [0, 1, 0] # obstacle.spin => spin = [0, 2, 0]
 [[obstacle]]
 shape = 'plane'
 normal = [0, 0, 1] # obstacle.normal => normal = [0, 1, 1]
