@@ -309,7 +309,7 @@ TEST_F(ContactsOfRuns, ArmsOfAHorseshoeClapAndKeepBothMomenta) {
 }
 
 TEST_F(ContactsOfRuns, DiceComeToRestOnOneOfTheirFaces) {
-  const json summary = summary_of("dice");
+  const json summary = summary_of("dice", {}, "0.5");
   ASSERT_EQ(summary["rigid_bodies"].size(), 3u);
   for (const json& die : summary["rigid_bodies"]) {
     const std::string name = die["obstacle"];
