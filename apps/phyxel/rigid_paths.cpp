@@ -4,7 +4,6 @@
 
 #include "csv.hpp"
 #include "files/trajectory_folder.hpp"
-#include "phyxel/error.hpp"
 
 namespace phyxel::app {
 namespace {

@@ -38,6 +38,9 @@ __global__ void copy_places(Fields<Real, StateReal> f, const Index* place,
   if (k < count) now[k] = position[k] + displacement_at(f, place[k]);
 }
 
+/// The number of numbers in a box of ways and a box of velocities.
+inline constexpr std::size_t numbers_of_way = 12;
+
 /// Finds the boxes of the ways of the phyxels of each group of the layer since points were found,
 /// and of their velocities: the lowest numbers of both [m, m/s], then the highest ones. One block
 /// of `tile_size` threads per group.
@@ -45,7 +48,7 @@ template <class Real, class StateReal>
 __global__ void find_ways(Fields<Real, StateReal> f, const Index* place,
                           const Vec3<double>* position, const Vec3<double>* found,
                           const Index* begin, const Index* end, double* ways) {
-  constexpr int numbers = 6;
+  constexpr int numbers = numbers_of_way / 2;
   double low[numbers], high[numbers];
   for (int n = 0; n < numbers; ++n) {
     low[n] = HUGE_VAL;

@@ -54,7 +54,7 @@ class DeviceBodyContacts {
     }
     group_begin_ = sent(begin, name);
     group_end_ = sent(end, name);
-    ways_ = {12 * begin.size(), name};
+    ways_ = {numbers_of_way * begin.size(), name};
     const std::size_t bodies = contact.distances.size();
     const auto accumulators = static_cast<unsigned>(std::clamp<std::size_t>(256 / bodies, 2, 128));
     sums_ = DeviceSums(static_cast<int>(bodies) * ContactTerms::count, accumulators, name);
@@ -186,7 +186,7 @@ class DeviceBodyContacts {
       return Vec3d{numbers[first], numbers[first + 1], numbers[first + 2]};
     };
     for (std::size_t g = 0; g < ways.size(); ++g) {
-      const std::size_t first = 12 * g;
+      const std::size_t first = numbers_of_way * g;
       ways[g] = {{vector(first), vector(first + 6)}, {vector(first + 3), vector(first + 9)}};
     }
     return ways;
@@ -239,13 +239,7 @@ class DeviceBodyContacts {
     forces_ = {places.size(), name};
   }
   void send_penalties(double dt) {
-    const Model& model = m_.model();
-    std::vector<double> regain;
-    for (const Index k : points_.own()) {
-      const Part& part = part_of(model, model.body_contact.layer.phyxels[k]);
-      regain.push_back(1 / damped_flow(part.material.damping, dt).keep);
-    }
-    regain_ = sent(regain, name);
+    regain_ = sent(points_.regains(dt), name);
     modulus_ = sent(points_.wave_moduli(), name);
   }
   template <class T>

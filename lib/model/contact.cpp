@@ -12,11 +12,11 @@
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/parts.hpp"
+#include "model/rigid_tips.hpp"
 #include "model/spatial_hash.hpp"
 #include "model/symmetry.hpp"
 #include "phyxel/error.hpp"
 #include "scene/scene_error.hpp"
-#include "solver/rigid_contacts.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -214,18 +214,9 @@ bool is_deepest_overlap(const Model& model, double depth, Index phyxel, double t
 
 std::string overlap_at_start(const Model& model, const Scene& scene) {
   if (model.obstacles.empty()) return {};
-  if (const RigidContacts::Overlap rigid = RigidContacts(model).overlap_at_start();
-      rigid.depth > 0 && (!model.share || model.share->communicator->rank() == 0)) {
-    const Obstacle &first = model.obstacles[rigid.first], &second = model.obstacles[rigid.second];
-    constexpr double rounding = 1e-9;  // of places
-    if (rigid.depth > rounding * (norm(first.place) + norm(second.place))) {
-      const std::string& where = scene.obstacles[rigid.first].where;
-      return fmt::format(
-          "{}{}obstacle \"{}\" is {:.3g} m deep in obstacle \"{}\" at the start, and one of them "
-          "is a "
-          "free body; allowed: to touch it",
-          where, where.empty() ? "" : ": ", first.name, rigid.depth, second.name);
-    }
+  if (std::string problem = rigid_overlap_at_start(model, scene); !problem.empty()) {
+    const bool is_first = !model.share || model.share->communicator->rank() == 0;
+    return is_first ? problem : "";
   }
   const Deepest found = deepest_of(model);
   // The rounding of coordinates, and of surfaces in files in float.

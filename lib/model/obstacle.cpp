@@ -34,7 +34,8 @@ std::shared_ptr<const Surface> surface_of(const ObstacleRequest& request) {
   return std::make_shared<const Surface>(std::move(surface));
 }
 
-/// What a closed surface holds: the sum over the tetrahedra between the origin and its triangles.
+/// The moments of the inside of a closed surface: sums over the tetrahedra between the origin and
+/// its triangles.
 SolidMoments solid_of(const Surface& surface) {
   SolidMoments sum;
   for (const Triangle& t : surface.triangle) {
@@ -78,13 +79,10 @@ void set_free(Obstacle& made, const ObstacleRequest& request) {
   const Sym3d& s = solid.second;
   const double xx = s.xx - volume * m.x * m.x, yy = s.yy - volume * m.y * m.y,
                zz = s.zz - volume * m.z * m.z;
-  const Mat3d own{{{yy + zz, volume * m.x * m.y - s.xy, volume * m.x * m.z - s.xz},
-                   {volume * m.x * m.y - s.xy, xx + zz, volume * m.y * m.z - s.yz},
-                   {volume * m.x * m.z - s.xz, volume * m.y * m.z - s.yz, xx + yy}}};
-  const Mat3d i = density * (made.turn * own * transpose(made.turn));
-  made.free = RigidMass{density * volume,
-                        made.place + made.turn * m,
-                        {i(0, 0), i(0, 1), i(0, 2), i(1, 1), i(1, 2), i(2, 2)}};
+  const Sym3d own{yy + zz, volume * m.x * m.y - s.xy, volume * m.x * m.z - s.xz,
+                  xx + zz, volume * m.y * m.z - s.yz, xx + yy};
+  made.free =
+      RigidMass{density * volume, made.place + made.turn * m, turned(made.turn, density * own)};
   made.start.place = made.free->centre;
   made.start.velocity = request.velocity;
   made.start.angular_momentum = made.free->inertia * request.spin;
@@ -127,11 +125,6 @@ Obstacle obstacle_of(const ObstacleRequest& request, const ContactRequest& share
 /// Where a free body is, as a path.
 Path path_to(const RigidMass& mass, const RigidState& state) {
   return {state.place - mass.centre, change_by(state.turn), mass.centre};
-}
-
-/// The matrix of ω ×.
-Mat3d spin_of(Vec3d omega) {
-  return {{{0, -omega.z, omega.y}, {omega.z, 0, -omega.x}, {-omega.y, omega.x, 0}}};
 }
 
 /// Sets the rigid motion of a step.
@@ -192,9 +185,9 @@ ObstacleStep Obstacle::placed(const RigidState& state) const {
   ObstacleStep step = step_between(here, here, 0);
   step.drift = state.velocity;
   step.centre = state.place;
-  step.spin = spin_of(angular_velocity(free->inertia, state));
+  step.spin = cross_matrix(angular_velocity(free->inertia, state));
   step.velocity = rigid_velocity(step, step.place);
-  step.slope = step.spin * (identity<double>() + here.turn);
+  step.slope = step.spin * rotation_of(state.turn);
   return step;
 }
 
@@ -204,7 +197,7 @@ ObstacleStep Obstacle::step_between(const RigidState& before, const RigidState& 
   step.drift = 0.5 * (before.velocity + after.velocity);
   RigidState mean = before;
   mean.angular_momentum = 0.5 * (before.angular_momentum + after.angular_momentum);
-  step.spin = spin_of(angular_velocity(free->inertia, mean));
+  step.spin = cross_matrix(angular_velocity(free->inertia, mean));
   step.centre = after.place;
   return step;
 }

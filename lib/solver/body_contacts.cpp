@@ -7,7 +7,6 @@
 
 #include "mesh/distance_field.hpp"
 #include "model/parts.hpp"
-#include "phyxel/physics/verlet.hpp"
 #include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
@@ -44,10 +43,7 @@ void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
   own_active_.clear();
   if (!pushes_) return;
   modulus_ = points_.wave_moduli();
-  regain_.clear();
-  for (std::size_t p = 0; p < count(); ++p) {
-    regain_.push_back(1 / damped_flow(part_of(model_, phyxel(p)).material.damping, dt).keep);
-  }
+  regain_ = points_.regains(dt);
 }
 
 void BodyContacts::set_gradient(std::size_t p, const Mat3d& gradient) {

@@ -47,6 +47,8 @@ class TouchingPoints {
   bool any() const { return any_; }
   /// The modulus of pressure waves of each point [Pa]. Of a share: collective.
   std::vector<double> wave_moduli() const;
+  /// 1 over what the damping of a step of `dt` [s] keeps of a velocity, of this rank's points.
+  std::vector<double> regains(double dt) const;
   /// Gives the points of other ranks the values that their owners have: motions, or vectors. Of a
   /// share: collective. @param of_points shape [points]
   template <class T>
@@ -158,19 +160,12 @@ class BodyContacts {
       find_forces();
       const ContactPasses passes = this->passes();
       for (const Index p : own_active_) {
-        const Vec3d change = passes.change_by(forces_[p], p);
-        if (change != Vec3d{}) {
-          const SurfaceState state = get(phyxel(p));
-          set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
-          velocity_[p] = get(phyxel(p)).velocity;
-        }
+        move_by(passes.change_by(forces_[p], p), p, get, set);
         totals_[p].normal += forces_[p].normal;
         totals_[p].tangential += forces_[p].tangential;
       }
     }
-    for (const Index p : own_active_) {
-      if (totals_[p].normal != Vec3d{}) add_to_sums(p, totals_[p]);
-    }
+    add_totals();
   }
   /// Calls each(i, force) with the force [N] of other bodies in the last step on phyxels of this
   /// rank, held ones, too.
@@ -221,13 +216,21 @@ class BodyContacts {
       for (const Index p : own_active_) {
         const Vec3d friction = forces_[p].tangential;
         totals_[p].tangential += friction;
-        const Vec3d change = passes().change_by({{}, friction}, p);
-        if (change == Vec3d{}) continue;
-        const SurfaceState state = get(phyxel(p));
-        set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
-        velocity_[p] = get(phyxel(p)).velocity;
+        move_by(passes().change_by({{}, friction}, p), p, get, set);
       }
     }
+    add_totals();
+  }
+  /// Changes the velocity of a point at the end of the step, and its place by as much over the
+  /// step.
+  template <class Get, class Set>
+  void move_by(Vec3d change, Index p, Get&& get, Set&& set) {
+    if (change == Vec3d{}) return;
+    const SurfaceState state = get(phyxel(p));
+    set(phyxel(p), {state.displacement + dt_ * change, state.velocity + change});
+    velocity_[p] = get(phyxel(p)).velocity;
+  }
+  void add_totals() {
     for (const Index p : own_active_) {
       if (totals_[p].normal != Vec3d{}) add_to_sums(p, totals_[p]);
     }

@@ -22,8 +22,8 @@ BodyPenalty::BodyPenalty(const Model& model) : model_(model), points_(model) {
   for (const auto& distances : model.body_contact.distances) {
     fields_.push_back(distances ? distances.view() : PlacedDistances{});
   }
+  rubs_ = has_body_friction(model.body_contact);
   const auto note = [&](const ContactLaw& law) {
-    rubs_ = rubs_ || law.static_friction > 0;
     has_two_frictions_ = has_two_frictions_ || has_two_frictions(law);
   };
   note(model.body_contact.law);

@@ -28,11 +28,12 @@ PlacedObstacles obstacles_over(const Model& model, double time, double span) {
   return placed;
 }
 
-PlacedObstacles obstacles_now(const Model& model, double time, std::span<const RigidState> rigid) {
+PlacedObstacles obstacles_now(const Model& model, double time, double dt,
+                              std::span<const RigidState> rigid) {
   PlacedObstacles placed;
   std::size_t free = 0;
   for (const Obstacle& obstacle : model.obstacles) {
-    placed.push_back(obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(time, 0));
+    placed.push_back(obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(time, dt));
   }
   return placed;
 }

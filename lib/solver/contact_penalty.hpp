@@ -26,8 +26,10 @@ PlacedObstacles obstacles_after(const Model& model, double share, double since);
 /// Returns the obstacles at a time [s], with their velocities over the last `span` [s].
 PlacedObstacles obstacles_over(const Model& model, double time, double span);
 
-/// Returns the obstacles at a time [s], free bodies in their states.
-PlacedObstacles obstacles_now(const Model& model, double time, std::span<const RigidState> rigid);
+/// Returns the obstacles at the end of the step of `dt` [s] from a time [s], free bodies in their
+/// states.
+PlacedObstacles obstacles_now(const Model& model, double time, double dt,
+                              std::span<const RigidState> rigid);
 
 /// Stiffness of penalties, times that of a phyxel against its neighbours. A layer of phyxels on a
 /// face, s apart, then is as stiff as a fifth of s of the body.

@@ -7,6 +7,8 @@
 
 #include "model/parts.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/law_table.hpp"
+#include "phyxel/physics/contact_penalty.hpp"
 
 namespace phyxel {
 namespace {
@@ -40,12 +42,12 @@ double squared_frequency_of_bodies(const Model& model) {
   constexpr double kappa = 1.5;
   std::map<std::pair<double, double>, double> support;  // the smallest, by modulus and density
   for (const Part& part : model.parts) {
-    const auto kind = std::pair(pressure_wave_modulus(part.material), part.material.density);
+    const auto kind = std::pair(wave_stiffness_at_rest(part.material), part.material.density);
     support.try_emplace(kind, HUGE_VAL);
   }
   for (const Index i : model.body_contact.layer.phyxels) {
     const Material& material = part_of(model, i).material;
-    double& least = support[{pressure_wave_modulus(material), material.density}];
+    double& least = support[{wave_stiffness_at_rest(material), material.density}];
     least = std::min(least, model.neighbourhood.support[i]);
   }
   if (model.share) {
@@ -55,7 +57,7 @@ double squared_frequency_of_bodies(const Model& model) {
   for (const auto& [kind, h] : support) {
     for (const auto& [other, h_other] : support) {
       if (h == HUGE_VAL || h_other == HUGE_VAL) continue;
-      const double modulus = 2 * kind.first * other.first / (kind.first + other.first);
+      const double modulus = harmonic_mean(kind.first, other.first);
       square = std::max(square, (1 + kappa) * share_of_layer * model.body_contact.penalty *
                                     modulus / (kind.second * h) * (1 / h + kappa / h_other));
     }
@@ -75,11 +77,6 @@ bool has_body_friction(const BodyContact& contact) {
   return contact.law.static_friction > 0 ||
          std::any_of(contact.pairs.begin(), contact.pairs.end(),
                      [](const BodyContact::Pair& pair) { return pair.law.static_friction > 0; });
-}
-
-double pressure_wave_modulus(const Material& material) {
-  const double c = pressure_wave_speed(material);
-  return material.density * c * c;
 }
 
 std::vector<double> stiffness_of_layer(const Model& model, double share) {

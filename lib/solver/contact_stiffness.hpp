@@ -23,9 +23,6 @@ inline bool has_body_penalties(const Model& model) {
 /// True if some bodies rub on each other.
 bool has_body_friction(const BodyContact& contact);
 
-/// The modulus of pressure waves at rest [Pa].
-double pressure_wave_modulus(const Material& material);
-
 /// The stiffness of the penalty of an obstacle on each phyxel of the contact layer [N/m],
 /// share m c²/h².
 std::vector<double> stiffness_of_layer(const Model& model, double share);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "model/contact.hpp"
+#include "model/rigid_tips.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
@@ -82,7 +83,7 @@ std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver
   const std::vector<LayerGroup> groups = groups_of(model, model.contact);
   const PlacedLayer layer(model, groups, [&](Index i) { return state.displacement[i]; });
   const PlacedObstacles now =
-      after.empty() ? obstacles_now(model, solver.time(), state.rigid) : after;
+      after.empty() ? obstacles_now(model, solver.time(), 0, state.rigid) : after;
   for (std::size_t o = 0; o < depths.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     double& deepest = depths[o];
@@ -118,12 +119,11 @@ double smallest_support(const Model& model) {
   throw DivergedError(why);
 }
 
-/// Ends a run in which a free body has gone, or turns by more than a radian in a step.
+/// Ends a run in which the state of a free body is not finite.
 void check_rigid(const Model& model, std::span<const RigidState> rigid) {
-  std::size_t free = 0;
-  for (const Obstacle& obstacle : model.obstacles) {
-    if (!obstacle.free || free == rigid.size()) continue;
-    const auto numbers = rigid[free++].numbers();
+  const std::vector<std::size_t> bodies = free_bodies(model);
+  for (std::size_t k = 0; k < rigid.size(); ++k) {
+    const auto numbers = rigid[k].numbers();
     if (std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); })) {
       continue;
     }
@@ -132,7 +132,7 @@ void check_rigid(const Model& model, std::span<const RigidState> rigid) {
         fmt::format("the simulation diverged: the state of the free body \"{}\" is not finite; "
                     "it is too light for what it touches, or turns by more than a radian in a "
                     "step: allowed is a smaller time.step",
-                    obstacle.name));
+                    model.obstacles[bodies[k]].name));
   }
 }
 
@@ -173,10 +173,10 @@ void check_contact_speeds(const Model& model, const Solver& solver, double large
                     "{:.3g} s (time.step, time.safety), or lower speeds",
                     largest_speed, way, dt, 0.5 * support, 0.25 * support / largest_speed));
   }
-  std::size_t free = 0;
-  for (const Obstacle& obstacle : model.obstacles) {
-    const double of_obstacle = obstacle.largest_speed(
-        obstacle.free ? obstacle.placed(rigid[free++]) : obstacle.step_from(solver.time(), dt));
+  const PlacedObstacles placed = obstacles_now(model, solver.time(), dt, rigid);
+  for (std::size_t o = 0; o < placed.size(); ++o) {
+    const Obstacle& obstacle = model.obstacles[o];
+    const double of_obstacle = obstacle.largest_speed(placed[o]);
     const double speed = largest_speed + of_obstacle;
     const double most = 0.5 * std::min(obstacle.inner_radius(), support);
     if (!(speed * dt > most)) continue;

@@ -13,7 +13,7 @@ void add_obstacles(const Model& model, const State& state, double time, PresentC
   const std::vector<double> stiffness = stiffness_of_layer(model, share_of_layer);
   const std::vector<LayerGroup> groups = groups_of(model, model.contact);
   const PlacedLayer layer(model, groups, [&](Index i) { return state.displacement[i]; });
-  const PlacedObstacles now = obstacles_now(model, time, state.rigid);
+  const PlacedObstacles now = obstacles_now(model, time, 0, state.rigid);
   for (std::size_t o = 0; o < now.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     if (!(obstacle.penalty > 0)) continue;

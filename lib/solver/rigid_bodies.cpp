@@ -26,13 +26,10 @@ RigidState at_its_time(const RigidMass& mass, const RigidState& state, Vec3d fal
 
 }  // namespace
 
-RigidBodies::RigidBodies(const Model& model) : model_(model), contacts_(model) {
+RigidBodies::RigidBodies(const Model& model)
+    : model_(model), bodies_(free_bodies(model)), contacts_(model) {
   number_.resize(model.obstacles.size());
-  for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
-    if (!model.obstacles[o].free) continue;
-    number_[o] = bodies_.size();
-    bodies_.push_back(o);
-  }
+  for (std::size_t k = 0; k < bodies_.size(); ++k) number_[bodies_[k]] = k;
   steps_.resize(bodies_.size());
   earlier_.resize(terms * bodies_.size());
   put({}, 0);
@@ -100,11 +97,10 @@ void RigidBodies::act_back(std::span<const ExactSum> sums) {
 
 void add_rigid(const Model& model, std::span<const RigidState> states, double lag,
                Diagnostics& sums) {
-  std::size_t k = 0;
-  for (const Obstacle& obstacle : model.obstacles) {
-    if (!obstacle.free || k == states.size()) continue;
-    const RigidMass& mass = *obstacle.free;
-    const RigidState& state = states[k++];
+  const std::vector<std::size_t> bodies = free_bodies(model);
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    const RigidMass& mass = *model.obstacles[bodies[k]].free;
+    const RigidState& state = states[k];
     sums.kinetic_energy += kinetic_energy(mass, at_its_time(mass, state, lag * model.gravity));
     sums.gravity_energy += -mass.mass * dot(model.gravity, state.place - mass.centre);
     // Phyxels have all of the impulses already that act back.
@@ -124,8 +120,8 @@ std::vector<RigidReading> read_rigid_bodies(const Model& model, const Backend& b
   RigidBodies next(model);  // after the coming step
   next.put(states, solver.dt());
   next.begin_step(solver.time(), solver.dt());
-  for (const Obstacle& obstacle : model.obstacles) {
-    if (!obstacle.free) continue;
+  for (const std::size_t o : free_bodies(model)) {
+    const Obstacle& obstacle = model.obstacles[o];
     const RigidState& after = next.states()[readings.size()];
     RigidState now = states.at(readings.size());
     now.velocity = 0.5 * (now.velocity + after.velocity);

@@ -13,9 +13,9 @@ namespace phyxel {
 
 /// Moves free bodies step by step. A step adds gravity to their velocities, keeps them out of each
 /// other and of other obstacles, and moves them; then phyxels are kept out of them, as out of
-/// obstacles on a path, and what that takes acts back on them in the next step. So phyxels stick to
-/// them as to something at rest, and both momenta of all bodies are kept to rounding. All ranks do
-/// the same.
+/// obstacles on a path, and the impulses of that act back on them in the next step. So phyxels
+/// stick to them as to an obstacle at rest, and both momenta of all bodies are kept to rounding.
+/// All ranks do the same.
 class RigidBodies {
  public:
   /// @param model must outlive this

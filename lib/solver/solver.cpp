@@ -66,27 +66,26 @@ void check_times(const State& state) {
   }
 }
 
-/// Refuses restitution to methods by penalties.
-void refuse_restitution(const Model& model, Method method) {
-  const auto check = [&](const ContactLaw& law, const std::string& section,
-                         const std::string& of_what) {
-    if (!(law.restitution > 0)) return;
-    const std::string why = fmt::format(
-        "{}.restitution = {:g}{} found with solver.method = \"{}\"; allowed with this method: 0, "
-        "since its contact is elastic and has no impacts in which a surface could lose speed",
-        section, law.restitution, of_what, method_name(method));
+/// Refuses restitution and free bodies to methods by penalties.
+void refuse_impacts(const Model& model, Method method) {
+  const auto refuse = [&](const std::string& why) {
     if (model.share) throw AgreedError(ExitCode::bad_input, why);
     throw InputError(why);
   };
+  const auto check = [&](const ContactLaw& law, const std::string& section,
+                         const std::string& of_what) {
+    if (!(law.restitution > 0)) return;
+    refuse(fmt::format(
+        "{}.restitution = {:g}{} found with solver.method = \"{}\"; allowed with this method: 0, "
+        "since its contact is elastic and has no impacts in which a surface could lose speed",
+        section, law.restitution, of_what, method_name(method)));
+  };
   for (const Obstacle& obstacle : model.obstacles) {
     if (obstacle.free) {
-      const std::string why = fmt::format(
+      refuse(fmt::format(
           "obstacle.density of obstacle \"{}\", a free rigid body, found with solver.method = "
-          "\"{}\"; "
-          "allowed with this method: obstacles at rest or on a path",
-          obstacle.name, method_name(method));
-      if (model.share) throw AgreedError(ExitCode::bad_input, why);
-      throw InputError(why);
+          "\"{}\"; allowed with this method: obstacles at rest or on a path",
+          obstacle.name, method_name(method)));
     }
     check(obstacle.law, "obstacle", fmt::format(" of obstacle \"{}\"", obstacle.name));
   }
@@ -115,7 +114,7 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
     : Solver(backend, start) {
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
-  if (method != Method::verlet) refuse_restitution(model, method);
+  if (method != Method::verlet) refuse_impacts(model, method);
   const std::size_t words = words_of(no_step_sums(model)).size();
   if (!start.step_sums.empty() && start.step_sums.size() != words) {
     throw InputError(

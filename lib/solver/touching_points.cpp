@@ -5,11 +5,11 @@
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/parts.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "rank_exchange.hpp"
 #include "solver/body_contacts.hpp"
 #include "solver/boundary_conditions.hpp"
-#include "solver/contact_stiffness.hpp"
 #include "timeline.hpp"
 
 namespace phyxel {
@@ -210,10 +210,19 @@ std::vector<double> TouchingPoints::wave_moduli() const {
   std::vector<double> modulus(site_.size());
   for (std::size_t p = 0; p < own_.size(); ++p) {
     const Index i = model_.body_contact.layer.phyxels[own_[p]];
-    modulus[p] = pressure_wave_modulus(part_of(model_, i).material);
+    modulus[p] = wave_stiffness_at_rest(part_of(model_, i).material);
   }
   refresh(modulus);
   return modulus;
+}
+
+std::vector<double> TouchingPoints::regains(double dt) const {
+  std::vector<double> regain;
+  for (const Index k : own_) {
+    const Part& part = part_of(model_, model_.body_contact.layer.phyxels[k]);
+    regain.push_back(1 / damped_flow(part.material.damping, dt).keep);
+  }
+  return regain;
 }
 
 std::size_t TouchingPoints::bytes() const {

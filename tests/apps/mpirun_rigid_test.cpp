@@ -34,5 +34,20 @@ TEST_F(Mpirun, FreeBodiesMoveTheSameOnAllRanks) {
   }
 }
 
+TEST_F(Mpirun, AFreeBodyInTheFloorIsRefusedOnce) {
+  write("scene.toml",
+        "[time]\nend = 0.1\n[contact]\n[[obstacle]]\nname = 'floor'\nshape = 'plane'\n"
+        "translation = [0, 0, -0.1]\n"
+        "[[obstacle]]\nname = 'ball'\nshape = 'sphere'\nradius = 0.05\ndensity = 1000\n"
+        "translation = [0.5, 0, -0.06]\n"
+        "[[body]]\nname = 'block'\nshape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\n"
+        "[body.material]\nyoung = 1e6\npoisson = 0.3\ndensity = 1000\n");
+  const Outcome outcome = run_on(3, {"run", "scene.toml", "--out", "out"});
+  EXPECT_EQ(outcome.code, 2);
+  EXPECT_EQ(test::count_of("obstacle \"ball\" is 0.01 m deep in obstacle \"floor\"", outcome.err),
+            1)
+      << outcome.err;
+}
+
 }  // namespace
 }  // namespace phyxel

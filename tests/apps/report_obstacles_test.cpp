@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "model/contact.hpp"
 #include "obstacle_rays.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
@@ -78,6 +79,31 @@ TEST(ReplayObstacles, ThoseOfAllExamplesAreInTheirPlaces) {
     }
   }
   EXPECT_GE(scenes, 9);
+}
+
+class RigidPaths : public test::Folder {};
+
+TEST_F(RigidPaths, PutFreeBodiesWhereTheyWereInTheNearestFrame) {
+  const Scene scene = parse_scene(
+      "[time]\nend = 1\n[[obstacle]]\nname = 'die'\nshape = 'box'\nsize = [0.2, 0.2, 0.4]\n"
+      "density = 1\n[[body]]\nshape = 'block'\nsize = [1, 1, 1]\nspacing = 0.5\n"
+      "translation = [9, 0, 0]\n[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n",
+      "scene.toml");
+  const std::vector<Obstacle> obstacles = obstacles_of(scene);
+  write("rigid.csv",
+        "step,time [s],obstacle,shape,place_x [m],place_y [m],place_z [m],rotation_x [rad],"
+        "rotation_y [rad],rotation_z [rad]\n"
+        "0,0,die,box,0,0,0,0,0,0\n"
+        "9,1,die,box,1,2,3,0,1.5707963267948966,0\n");
+  const app::RigidPaths paths(folder_);
+  const auto distance = [&](double time, Vec3d x) {
+    return app::placed(obstacles, paths, time)[0].distance(x);
+  };
+  EXPECT_NEAR(distance(0.4, {0, 0, 0.2}), 0, 1e-12);  // rounding
+  // Turned by a right angle about y: its long edges are along x.
+  EXPECT_NEAR(distance(0.6, {1.2, 2, 3}), 0, 1e-12);
+  EXPECT_NEAR(distance(7, {1, 2, 3.1}), 0, 1e-12);
+  EXPECT_NEAR(app::placed(obstacles, {}, 1)[0].distance({0, 0, 0.2}), 0, 1e-12);
 }
 
 class PagesWithObstacles : public test::Program {

@@ -149,8 +149,8 @@ class Replay {
       DrawnObstacles drawn = drawn_obstacles(any().scene, scene, [&](const fs::path& mesh) {
         return obstacle_to_reading(mesh, scene, any().scene, folder_);
       });
-      obstacles_ = std::move(drawn.obstacles);
       paths_ = RigidPaths(folder_);
+      obstacles_ = std::move(drawn.obstacles);
       for (const std::string& line : drawn.left_out) notes_.push_back("The " + line + ".");
     } catch (const InputError& error) {
       notes_.push_back(fmt::format("Obstacles are left out: {}", error.what()));

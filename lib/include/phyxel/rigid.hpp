@@ -1,6 +1,8 @@
 /// Free rigid bodies: obstacles that move as forces ask them to.
 #pragma once
 
+#include <array>
+
 #include "phyxel/physics/rigid.hpp"
 #include "phyxel/types.hpp"
 
@@ -8,17 +10,15 @@ namespace phyxel {
 
 /// The state of a free rigid body.
 struct RigidState {
-  Vec3d place;             ///< Of its centre of mass, at t [m].
-  UnitQuaternion turn;     ///< From its position at rest, at t.
-  Vec3d velocity;          ///< Of its centre of mass over the last step [m/s].
-  Vec3d angular_momentum;  ///< About that centre, likewise [N m s].
-  /// What phyxels have done to it at the end of the last step, and what moves it in the next one
-  /// [N s].
-  Vec3d impulse;
-  Vec3d angular_impulse;  ///< About its centre, likewise [N m s].
+  Vec3d place;             ///< Its centre of mass at t [m].
+  UnitQuaternion turn;     ///< Its rotation from rest to t.
+  Vec3d velocity;          ///< Velocity of its centre of mass over the last step [m/s].
+  Vec3d angular_momentum;  ///< Angular momentum about that centre over the last step [N m s].
+  Vec3d impulse;  ///< Impulse of the phyxels in the last step, which moves it in the next [N s].
+  Vec3d angular_impulse;  ///< Angular impulse of the phyxels about its centre, likewise [N m s].
   double loss = 0;        ///< Energy lost in contact with other rigid bodies since t = 0 [J].
 
-  /// How many numbers it has.
+  /// The number of its numbers.
   static constexpr int count = 20;
   /// All numbers, in the order of the members.
   std::array<double, count> numbers() const {
@@ -42,7 +42,7 @@ struct RigidState {
 
 /// The angular velocity of a body [rad/s]. @param inertia at rest (`RigidMass`) [kg m²]
 inline Vec3d angular_velocity(const Sym3d& inertia, const RigidState& state) {
-  const Mat3d turn = identity<double>() + change_by(state.turn);
+  const Mat3d turn = rotation_of(state.turn);
   return turn * (inverse(inertia) * (transpose(turn) * state.angular_momentum));
 }
 

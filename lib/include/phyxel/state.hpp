@@ -67,7 +67,7 @@ struct State {
   /// What supports and obstacles have done in earlier steps, by the rule of `Solver::step_sums`:
   /// words of exact sums over all ranks. Empty if no support moves and there is no obstacle.
   std::vector<std::int64_t> step_sums;
-  /// Those of the free rigid bodies, in the order of the model's obstacles. Empty: as they start.
+  /// The states of the free rigid bodies, in the order of the model's obstacles. Empty: they start.
   std::vector<RigidState> rigid;
 };
 

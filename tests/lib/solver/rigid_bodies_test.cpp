@@ -7,9 +7,11 @@
 #include <cmath>
 #include <numbers>
 
+#include "phyxel/checkpoint.hpp"
 #include "phyxel/contacts.hpp"
 #include "phyxel/error.hpp"
 #include "support/contact_scene.hpp"
+#include "support/folder.hpp"
 
 namespace phyxel {
 namespace {
@@ -220,6 +222,18 @@ TEST(RigidBodies, GoOnAfterARestartWithTheSameBits) {
   EXPECT_EQ(one.displacement, other.displacement);
   EXPECT_EQ(one.velocity, other.velocity);
   EXPECT_EQ(one.rigid[0].numbers(), other.rigid[0].numbers());
+}
+
+class CheckpointsOfRigidBodies : public test::Folder {};
+
+TEST_F(CheckpointsOfRigidBodies, HoldAllNumbers) {
+  Rigid way(impact(), 1e-4);
+  way.solver.step(200);  // in contact, so that no number is zero
+  const State state = way.solver.state();
+  const State read = read_checkpoint(write_checkpoint(folder_, state, {})).state;
+  ASSERT_EQ(read.rigid.size(), 1u);
+  EXPECT_EQ(read.rigid[0].numbers(), state.rigid[0].numbers());
+  EXPECT_GT(norm(state.rigid[0].impulse), 0);
 }
 
 TEST(RigidBodies, DoTheSameOnAnyNumberOfThreads) {

@@ -24,13 +24,15 @@ PHYXEL_HD PenaltyForce penalty_force(const Gap& gap, double stiffness) {
           0.5 * stiffness * gap.distance * gap.distance};
 }
 
+/// The harmonic mean of two numbers.
+PHYXEL_HD double harmonic_mean(double a, double b) { return 2 * a * b / (a + b); }
+
 /// The stiffness of the penalty between a point and the surface of a body [N/m],
 /// share M a/h with the harmonic mean M of the moduli on both sides.
 /// @param of_point,of_surface moduli of pressure waves [Pa]
 PHYXEL_HD double surface_stiffness(double share, double of_point, double of_surface,
                                    const SurfaceSite& site) {
-  const double modulus = 2 * of_point * of_surface / (of_point + of_surface);
-  return share * modulus * site.area / site.range;
+  return share * harmonic_mean(of_point, of_surface) * site.area / site.range;
 }
 
 /// A point at the start of a step that penalties may push.

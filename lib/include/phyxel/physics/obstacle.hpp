@@ -50,7 +50,7 @@ struct SolidMoments {
   Vec3d first;        ///< ∫ x dV [m⁴].
   Sym3d second;       ///< ∫ x xᵀ dV [m⁵].
 
-  /// Those of a solid that is symmetric about the origin's planes.
+  /// The moments of a solid that is symmetric about the planes x = 0, y = 0 and z = 0.
   /// @param squares means of x², y² and z² [m²]
   static SolidMoments about_origin(double volume, Vec3d squares) {
     return {volume, {}, {volume * squares.x, 0, 0, volume * squares.y, 0, volume * squares.z}};

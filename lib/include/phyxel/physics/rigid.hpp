@@ -30,6 +30,19 @@ struct UnitQuaternion {
   Vec3d v;
 };
 
+/// The matrix of a × b as a product with b.
+inline Mat3d cross_matrix(Vec3d a) { return {{{0, -a.z, a.y}, {a.z, 0, -a.x}, {-a.y, a.x, 0}}}; }
+
+/// The upper triangle of a matrix that is symmetric but for rounding.
+inline Sym3d upper_triangle(const Mat3d& m) {
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 1), m(1, 2), m(2, 2)};
+}
+
+/// A symmetric tensor after a rotation.
+inline Sym3d turned(const Mat3d& rotation, const Sym3d& s) {
+  return upper_triangle(rotation * full(s) * transpose(rotation));
+}
+
 /// The rotation of a unit quaternion, less the identity.
 inline Mat3d change_by(const UnitQuaternion& q) {
   const Vec3d v = q.v;
@@ -38,6 +51,9 @@ inline Mat3d change_by(const UnitQuaternion& q) {
        {2 * (v.x * v.y + q.w * v.z), -2 * (v.x * v.x + v.z * v.z), 2 * (v.y * v.z - q.w * v.x)},
        {2 * (v.x * v.z - q.w * v.y), 2 * (v.y * v.z + q.w * v.x), -2 * (v.x * v.x + v.y * v.y)}}};
 }
+
+/// The rotation of a unit quaternion.
+inline Mat3d rotation_of(const UnitQuaternion& q) { return identity<double>() + change_by(q); }
 
 /// The rotation a after the rotation b, of unit length again.
 inline UnitQuaternion after(const UnitQuaternion& a, const UnitQuaternion& b) {
@@ -56,9 +72,8 @@ inline Vec3d axis_angle(const UnitQuaternion& q) {
 
 /// The inverse of a symmetric matrix that has one.
 inline Sym3d inverse(const Sym3d& s) {
-  const Mat3d whole{{{s.xx, s.xy, s.xz}, {s.xy, s.yy, s.yz}, {s.xz, s.yz, s.zz}}};
-  const Mat3d of = (1 / determinant(whole)) * cofactor(whole);
-  return {of(0, 0), of(0, 1), of(0, 2), of(1, 1), of(1, 2), of(2, 2)};
+  const Mat3d whole = full(s);
+  return upper_triangle((1 / determinant(whole)) * cofactor(whole));
 }
 
 /// The rotation of a step, in the axes in which the inertia I is given. With the vector part q of
@@ -66,16 +81,11 @@ inline Sym3d inverse(const Sym3d& s) {
 ///
 ///   2 w I q + 2 q × I q = Δt L;
 ///
-/// Newton's method solves it. What turns by more than about a radian in a step has no solution, and
-/// gets NaN.
+/// Newton's method solves it. A body that turns by more than about a radian in a step has no
+/// solution, and gets NaN.
 /// @param impulse Δt L [N m s²]
 inline UnitQuaternion turn_of_step(const Sym3d& inertia, Vec3d impulse) {
-  const auto crossed = [](Vec3d a) {
-    return Mat3d{{{0, -a.z, a.y}, {a.z, 0, -a.x}, {-a.y, a.x, 0}}};
-  };
-  const Mat3d i{{{inertia.xx, inertia.xy, inertia.xz},
-                 {inertia.xy, inertia.yy, inertia.yz},
-                 {inertia.xz, inertia.yz, inertia.zz}}};
+  const Mat3d i = full(inertia);
   Vec3d q = 0.5 * (inverse(inertia) * impulse);
   constexpr int most_iterations = 50;
   constexpr double rounding = 1e-15;
@@ -84,7 +94,7 @@ inline UnitQuaternion turn_of_step(const Sym3d& inertia, Vec3d impulse) {
     const Vec3d iq = i * q;
     const Vec3d rest = (2 * w) * iq + 2.0 * cross(q, iq) - impulse;
     const Mat3d slope =
-        (2 * w) * i + (-2 / w) * outer(iq, q) + 2.0 * (crossed(q) * i - crossed(iq));
+        (2 * w) * i + (-2 / w) * outer(iq, q) + 2.0 * (cross_matrix(q) * i - cross_matrix(iq));
     const Vec3d change = (1 / determinant(slope)) * (transpose(cofactor(slope)) * rest);
     q = q - change;
     const double square = dot(q, q);
