@@ -35,7 +35,25 @@ namespace detail {
 /// Allocates device memory; the result is not null for `bytes` > 0.
 /// @throws DeviceError naming the purpose, the requested and the free memory
 void* allocate(std::size_t bytes, const std::string& what);
+/// Frees it. @param pooled true if a `PooledMemory` existed when it was allocated
+void release(void* data, bool pooled);
 }  // namespace detail
+
+/// While one exists, the arrays that its thread makes lie in a pool that keeps what is freed: for
+/// work that makes many arrays again and again. Such an array must not be used by streams that do
+/// not synchronise with CUDA's default stream, nor by other processes.
+class PooledMemory {
+ public:
+  PooledMemory();
+  PooledMemory(const PooledMemory&) = delete;
+  PooledMemory& operator=(const PooledMemory&) = delete;
+  ~PooledMemory();
+  /// True if one exists in this thread.
+  static bool is_used();
+
+ private:
+  bool is_here_ = false;  // the device has pools
+};
 
 /// An array in device memory with RAII, initially undefined.
 template <class T>
@@ -44,13 +62,15 @@ class DeviceArray {
   DeviceArray() = default;
   /// @param what name of the array for messages, e.g. "the force matrix (575 x 575)"
   DeviceArray(std::size_t count, const std::string& what)
-      : data_(static_cast<T*>(detail::allocate(count * sizeof(T), what))), count_(count) {}
+      : data_(static_cast<T*>(detail::allocate(count * sizeof(T), what))),
+        count_(count),
+        pooled_(PooledMemory::is_used()) {}
   DeviceArray(DeviceArray&& other) noexcept { swap(other); }
   DeviceArray& operator=(DeviceArray&& other) noexcept {
     DeviceArray(std::move(other)).swap(*this);
     return *this;
   }
-  ~DeviceArray() { cudaFree(data_); }
+  ~DeviceArray() { detail::release(data_, pooled_); }
 
   T* data() const { return data_; }
   std::size_t size() const { return count_; }
@@ -74,9 +94,11 @@ class DeviceArray {
   void swap(DeviceArray& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(count_, other.count_);
+    std::swap(pooled_, other.pooled_);
   }
   T* data_ = nullptr;
   std::size_t count_ = 0;
+  bool pooled_ = false;
 };
 
 }  // namespace phyxel

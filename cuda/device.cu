@@ -196,7 +196,9 @@ namespace detail {
 void* allocate(std::size_t bytes, const std::string& what) {
   if (bytes == 0) return nullptr;
   void* data = nullptr;
-  const cudaError_t error = cudaMalloc(&data, bytes);
+  const bool pooled = PooledMemory::is_used();
+  const cudaError_t error =
+      pooled ? cudaMallocAsync(&data, bytes, cudaStreamLegacy) : cudaMalloc(&data, bytes);
   if (error == cudaErrorMemoryAllocation) {
     cudaGetLastError();
     std::size_t free = 0, total = 0;
@@ -205,9 +207,39 @@ void* allocate(std::size_t bytes, const std::string& what) {
                       gigabytes(bytes) + ", " + gigabytes(free) + " of " + gigabytes(total) +
                       " are free");
   }
-  check_cuda(error, "cudaMalloc");
+  check_cuda(error, pooled ? "cudaMallocAsync" : "cudaMalloc");
   return data;
 }
 
+void release(void* data, bool pooled) {
+  if (pooled && data) {
+    cudaFreeAsync(data, cudaStreamLegacy);
+  } else {
+    cudaFree(data);
+  }
+}
+
 }  // namespace detail
+
+namespace {
+thread_local int pools = 0;  // `PooledMemory` in use
+}
+
+PooledMemory::PooledMemory() {
+  int device = 0, has_pools = 0;
+  PHYXEL_CUDA(cudaGetDevice(&device));
+  PHYXEL_CUDA(cudaDeviceGetAttribute(&has_pools, cudaDevAttrMemoryPoolsSupported, device));
+  is_here_ = has_pools != 0;
+  if (!is_here_) return;
+  cudaMemPool_t pool = nullptr;
+  std::uint64_t kept = UINT64_MAX;
+  PHYXEL_CUDA(cudaDeviceGetDefaultMemPool(&pool, device));
+  PHYXEL_CUDA(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &kept));
+  ++pools;
+}
+
+PooledMemory::~PooledMemory() { pools -= is_here_ ? 1 : 0; }
+
+bool PooledMemory::is_used() { return pools > 0; }
+
 }  // namespace phyxel

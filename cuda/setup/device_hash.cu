@@ -36,16 +36,7 @@ void DeviceHash::fill(const DeviceArray<Vec3d>& position, const std::vector<Body
              index[i] = static_cast<Index>(i);
            });
   sort_pairs(bucket, index_);
-  start_ = {mask_ + 2, what};
-  for_each(
-      "start_buckets", static_cast<std::int64_t>(n) + 1,
-      [start = start_.data(), bucket = bucket.data(), n, mask = mask_] __device__(std::int64_t k) {
-        const auto end = static_cast<std::size_t>(k) < n ? bucket[k] : mask + 1;
-        const std::uint64_t begin = k > 0 ? std::uint64_t{bucket[k - 1]} + 1 : 0;
-        for (std::uint64_t b = begin; b <= end; ++b) {
-          start[b] = static_cast<std::uint32_t>(k);
-        }
-      });
+  start_ = starts_of<std::uint32_t>(bucket, mask_ + 1, what);
   entries_ = {n, what};
   hash = view();
   for_each(

@@ -4,6 +4,7 @@
 #include <thrust/iterator/counting_iterator.h>
 #include <thrust/iterator/transform_iterator.h>
 
+#include <bit>
 #include <cstdint>
 #include <cub/cub.cuh>
 #include <string>
@@ -40,26 +41,31 @@ void with_temporary(Algorithm&& algorithm) {
   PHYXEL_CUDA(algorithm(static_cast<void*>(temporary.data()), bytes));
 }
 
-/// Stable sort of pairs by key, in place.
+/// The number of bits that hold numbers below `end`.
+inline int bits_below(std::uint64_t end) {
+  return std::max(1, static_cast<int>(std::bit_width(end - (end > 0))));
+}
+
+/// Stable sort of pairs by key, in place. @param bits all others of the keys are zero
 template <class Key, class Value>
-void sort_pairs(DeviceArray<Key>& keys, DeviceArray<Value>& values) {
+void sort_pairs(DeviceArray<Key>& keys, DeviceArray<Value>& values, int bits = 8 * sizeof(Key)) {
   const auto count = static_cast<std::int64_t>(keys.size());
   DeviceArray<Key> sorted_keys(keys.size(), "set-up");
   DeviceArray<Value> sorted_values(values.size(), "set-up");
   with_temporary([&](void* memory, std::size_t& bytes) {
     return cub::DeviceRadixSort::SortPairs(memory, bytes, keys.data(), sorted_keys.data(),
-                                           values.data(), sorted_values.data(), count);
+                                           values.data(), sorted_values.data(), count, 0, bits);
   });
   keys = std::move(sorted_keys);
   values = std::move(sorted_values);
 }
 
 template <class T>
-void sort_values(DeviceArray<T>& values) {
+void sort_values(DeviceArray<T>& values, int bits = 8 * sizeof(T)) {
   DeviceArray<T> sorted(values.size(), "set-up");
   with_temporary([&](void* memory, std::size_t& bytes) {
     return cub::DeviceRadixSort::SortKeys(memory, bytes, values.data(), sorted.data(),
-                                          static_cast<std::int64_t>(values.size()));
+                                          static_cast<std::int64_t>(values.size()), 0, bits);
   });
   values = std::move(sorted);
 }
@@ -109,6 +115,30 @@ DeviceArray<T> running_sums(const DeviceArray<T>& values) {
   return sums;
 }
 
+/// The values with a flag, in their order. @param flags of the values, 0 or 1, of type char
+template <class In, class T>
+DeviceArray<T> flagged(In values, const DeviceArray<char>& flags) {
+  DeviceArray<T> chosen(flags.size(), "set-up");
+  const DeviceArray<std::int64_t> count(1, "set-up");
+  if (flags.size() == 0) return chosen;
+  with_temporary([&](void* memory, std::size_t& bytes) {
+    return cub::DeviceSelect::Flagged(memory, bytes, values, flags.data(), chosen.data(),
+                                      count.data(), static_cast<std::int64_t>(flags.size()));
+  });
+  std::int64_t number = 0;
+  count.download(&number);
+  DeviceArray<T> kept(static_cast<std::size_t>(number), "set-up");
+  if (number > 0) {
+    PHYXEL_CUDA(cudaMemcpy(kept.data(), chosen.data(), kept.bytes(), cudaMemcpyDeviceToDevice));
+  }
+  return kept;
+}
+/// The numbers of the flags that are 1.
+inline DeviceArray<Index> flagged_numbers(const DeviceArray<char>& flags) {
+  return flagged<thrust::counting_iterator<Index>, Index>(thrust::counting_iterator<Index>(0),
+                                                          flags);
+}
+
 template <class T>
 T last_of(const DeviceArray<T>& array) {
   T value;
@@ -131,6 +161,30 @@ std::vector<T> fetched(const DeviceArray<T>& array, std::size_t first, std::size
 template <class T>
 std::vector<T> fetched(const DeviceArray<T>& array) {
   return fetched(array, 0, array.size());
+}
+
+/// Writes the starts of lists; see `starts_of`.
+template <class Start, class List>
+struct StartLists {
+  const List* list;
+  std::size_t entries, lists;
+  Start* start;
+  __device__ void operator()(std::int64_t e) const {
+    const auto entry = static_cast<std::size_t>(e);
+    const std::size_t end = entry < entries ? static_cast<std::size_t>(list[entry]) : lists;
+    const std::size_t begin = entry > 0 ? static_cast<std::size_t>(list[entry - 1]) + 1 : 0;
+    for (std::size_t l = begin; l <= end; ++l) start[l] = static_cast<Start>(entry);
+  }
+};
+/// The first entry of each list, and the number of entries at the end, shape [lists + 1].
+/// @param list of each entry, ascending
+template <class Start, class List>
+DeviceArray<Start> starts_of(const DeviceArray<List>& list, std::size_t lists,
+                             const std::string& what) {
+  DeviceArray<Start> starts(lists + 1, what);
+  for_each("start_lists", static_cast<std::int64_t>(list.size()) + 1,
+           StartLists<Start, List>{list.data(), list.size(), lists, starts.data()});
+  return starts;
 }
 
 struct AroundBoth {

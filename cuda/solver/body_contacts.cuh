@@ -2,19 +2,18 @@
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <map>
 #include <string>
 #include <vector>
 
-#include "model/parts.hpp"
 #include "solver/body_contact_kernels.cuh"
-#include "solver/body_contacts.hpp"
 #include "solver/contact_stiffness.hpp"
+#include "solver/contact_watch.hpp"
 #include "solver/contacts.cuh"
 #include "solver/device_distances.cuh"
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
+#include "solver/device_touching_points.hpp"
 #include "solver/passes.cuh"
 #include "solver/thread_group.cuh"
 
@@ -26,8 +25,10 @@ class DeviceBodyContacts {
  public:
   explicit DeviceBodyContacts(DeviceModel<Real, StateReal>& model)
       : m_(model),
-        points_(model.model()),
-        watch_(model.model(), 1, 4),
+        layer_(model.model()),
+        points_(layer_, places_of(model.model().body_contact.layer.phyxels),
+                model.tiling().tiles()),
+        watch_(layer_, 1, 4),
         pushes_(has_body_penalties(model.model())),
         rubs_(pushes_ && has_body_friction(model.model().body_contact)) {
     if (!acts()) return;
@@ -42,13 +43,13 @@ class DeviceBodyContacts {
       fields.push_back(distances.view(view->second));
     }
     fields_ = sent(fields, name);
-    layer_place_ = sent(places_of(contact.layer.phyxels), name);
+    layer_place_ = sent(places_of(layer_.phyxels()), name);
     std::vector<Vec3<double>> positions;
-    for (const Index i : contact.layer.phyxels) positions.push_back(m_.model().position[i]);
+    for (const SurfaceSite& site : layer_.sites()) positions.push_back(site.rest);
     layer_position_ = sent(positions, name);
     layer_found_ = {positions.size(), name};
     std::vector<Index> begin, end;
-    for (const LayerGroup& group : watch_.groups()) {
+    for (const LayerGroup& group : layer_.groups()) {
       begin.push_back(static_cast<Index>(group.begin));
       end.push_back(static_cast<Index>(group.end));
     }
@@ -69,20 +70,19 @@ class DeviceBodyContacts {
     if (watch_.is_due(dt)) look(dt);
     dt_ = dt;
     if (!points_.any()) return;
-    sums_.prepare(place_.size(), 1, [&] { m_.wait(); });
-    passes.put_gradients({gradients_.data(), stride(), tiles_.data()},
-                         static_cast<Index>(tiles_.size()));
+    sums_.prepare(own().place.size(), 1, [&] { m_.wait(); });
+    passes.put_gradients({gradients_.data(), stride(), own().tiles.data()},
+                         static_cast<Index>(own().tiles.size()));
     m_.launch_each("begin_motion", begin_motion<Real, StateReal>, count(), m_.fields(), places());
   }
   /// Changes the velocities with which the step starts by penalties. Of a share: collective.
   void push_apart() {
     if (!pushes_ || !points_.any()) return;
     const PenaltyPasses passes = penalties();
-    const int rows = static_cast<int>(rows_.size());
     m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
     if (m_.share()) refresh(motion_);
-    launch_groups("find_touches", find_touches, rows, passes, rows);
-    launch_groups("find_row_pushes", find_row_pushes, rows, passes, rows);
+    launch_groups("find_touches", find_touches, rows(), passes, rows());
+    launch_groups("find_row_pushes", find_row_pushes, rows(), passes, rows());
     launch_groups("push_apart", cuda::push_apart<Real, StateReal>, count(), m_.fields(), passes,
                   places(), regain_.data());
   }
@@ -105,11 +105,11 @@ class DeviceBodyContacts {
   std::size_t bytes() const {
     if (!acts()) return 0;
     std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() +
-                        layer_found_.bytes() + ways_.bytes() + sums_.bytes() + site_.bytes() +
-                        motion_.bytes() + velocity_.bytes() + response_.bytes() + rows_.bytes() +
-                        near_.bytes() + carries_.bytes() + touch_.bytes() + force_.bytes() +
-                        share_.bytes() + forces_.bytes() + gradients_.bytes() + regain_.bytes() +
-                        modulus_.bytes();
+                        layer_found_.bytes() + group_begin_.bytes() + group_end_.bytes() +
+                        ways_.bytes() + sums_.bytes() + points_.bytes() + motion_.bytes() +
+                        velocity_.bytes() + response_.bytes() + carries_.bytes() + touch_.bytes() +
+                        force_.bytes() + share_.bytes() + forces_.bytes() + gradients_.bytes() +
+                        regain_.bytes() + modulus_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -117,8 +117,12 @@ class DeviceBodyContacts {
  private:
   static constexpr const char* name = "contact";
 
-  int count() const { return static_cast<int>(place_.size()); }
-  std::size_t stride() const { return tiles_.size() * tile_size; }
+  const DeviceTouchingPoints::Own& own() const { return points_.own(); }
+  const DeviceTouchingPoints::Lists& lists() const { return points_.lists(); }
+  int count() const { return static_cast<int>(own().place.size()); }
+  int rows() const { return static_cast<int>(lists().rows.size()); }
+  int points() const { return static_cast<int>(lists().site.size()); }
+  std::size_t stride() const { return own().tiles.size() * tile_size; }
   std::vector<Index> places_of(const std::vector<Index>& phyxels) const {
     std::vector<Index> places;
     for (const Index i : phyxels) places.push_back(m_.tiling().place[i]);
@@ -128,17 +132,16 @@ class DeviceBodyContacts {
   /// Moves phyxels out of the bodies that the step has led them into.
   void move_apart() {
     const ContactPasses passes = this->passes();
-    const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
     if (m_.share()) {
       refresh(motion_);
       refresh(velocity_);
     }
-    launch_groups("find_touches", find_touches, rows, passes, rows);
-    launch_groups("find_shares", find_shares, points, passes, points);
-    launch_groups("find_responses", find_responses, rows, passes, rows);
+    launch_groups("find_touches", find_touches, rows(), passes, rows());
+    launch_groups("find_shares", find_shares, points(), passes, points());
+    launch_groups("find_responses", find_responses, rows(), passes, rows());
     for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
       if (sweep > 0 && m_.share()) refresh(velocity_);
-      launch_groups("find_row_forces", find_row_forces, rows, passes, rows);
+      launch_groups("find_row_forces", find_row_forces, rows(), passes, rows());
       launch_groups("move_apart", cuda::move_apart<Real, StateReal>, count(), m_.fields(), passes,
                     places());
     }
@@ -146,11 +149,10 @@ class DeviceBodyContacts {
   /// Adds friction to penalties.
   void rub_apart() {
     const PenaltyPasses passes = penalties();
-    const int rows = static_cast<int>(rows_.size()), points = static_cast<int>(site_.size());
     if (m_.share()) refresh(velocity_);
-    launch_groups("find_shares", find_shares, points, passes, points);
-    launch_groups("find_responses", find_responses, rows, passes, rows);
-    launch_groups("find_row_rubs", find_row_rubs, rows, passes, rows);
+    launch_groups("find_shares", find_shares, points(), passes, points());
+    launch_groups("find_responses", find_responses, rows(), passes, rows());
+    launch_groups("find_row_rubs", find_row_rubs, rows(), passes, rows());
     launch_groups("rub_apart", cuda::rub_apart<Real, StateReal>, count(), m_.fields(), passes,
                   places());
   }
@@ -161,19 +163,17 @@ class DeviceBodyContacts {
   /// Finds the points that may touch anew if phyxels have moved far enough.
   void look(double dt) {
     const int count = static_cast<int>(layer_place_.size());
-    if (!watch_.is_late_by(ways_now(), dt, points_.skin())) return;
+    if (!watch_.is_late_by(ways_now(), dt, layer_.skin())) return;
     m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
                    layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
     m_.wait();
-    std::vector<Vec3d> places = fetched(layer_found_);
-    points_.find(places, dt);
-    watch_.found(std::move(places), points_.skin());
-    send_points();
-    if (pushes_) send_penalties(dt);
+    points_.find(layer_found_, dt);
+    watch_.found(points_.reach());
+    make_arrays(dt);
   }
   /// The ways of the groups of the layer since points were found; none before that.
   std::vector<SurfaceWay> ways_now() {
-    std::vector<SurfaceWay> ways(watch_.groups().size());
+    std::vector<SurfaceWay> ways(layer_.groups().size());
     if (watch_.generation() == 0 || ways.empty()) return ways;
     const auto blocks = static_cast<unsigned>(ways.size());
     find_ways<<<blocks, tile_size, 0, m_.stream()>>>(
@@ -191,60 +191,25 @@ class DeviceBodyContacts {
     }
     return ways;
   }
-  void send_points() {
-    const Model& model = m_.model();
-    std::vector<Index> phyxels, bodies;
-    std::vector<Vec3<double>> positions, centres;
-    for (const Index k : points_.own()) {
-      const Index i = model.body_contact.layer.phyxels[k];
-      const Part& part = part_of(model, i);
-      phyxels.push_back(i);
-      positions.push_back(model.position[i]);
-      centres.push_back(part.centre);
-      bodies.push_back(part.body);
-    }
-    const std::vector<Index> places = places_of(phyxels);
-    std::vector<Index> tiles;
-    for (const Index place : places) tiles.push_back(place / tile_size);
-    std::sort(tiles.begin(), tiles.end());
-    tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
-    std::vector<Index> entries;
-    for (const Index place : places) {
-      const auto tile = std::lower_bound(tiles.begin(), tiles.end(), place / tile_size);
-      entries.push_back(static_cast<Index>(tile - tiles.begin()) * tile_size + place % tile_size);
-    }
-    place_ = sent(places, name);
-    position_ = sent(positions, name);
-    centre_ = sent(centres, name);
-    body_ = sent(bodies, name);
-    entry_ = sent(entries, name);
-    tiles_ = sent(tiles, name);
+  /// Makes the arrays of the passes for the points that are found.
+  void make_arrays(double dt) {
+    const PooledMemory pooled;
+    const std::size_t count = own().place.size(), points = lists().site.size(),
+                      rows = lists().rows.size();
     gradients_ = {9 * stride(), name};
-    site_ = sent_span(points_.sites());
-    motion_ = sent(std::vector<SurfaceMotion>(points_.sites().size()), name);
-    velocity_ = sent(std::vector<Vec3<double>>(points_.sites().size()), name);
-    rows_ = sent_span(points_.rows());
-    near_start_ = sent(points_.near().offsets, name);
-    near_ = sent(points_.near().indices, name);
-    row_of_entry_ = sent_span(points_.row_of_entry());
-    entries_of_start_ = sent(points_.entries_of().offsets, name);
-    entries_of_ = sent(points_.entries_of().indices, name);
-    rows_from_start_ = sent(points_.rows_from().offsets, name);
-    rows_from_ = sent(points_.rows_from().indices, name);
-    touch_ = {points_.rows().size(), name};
-    response_ = {points_.rows().size(), name};
-    force_ = {points_.rows().size(), name};
-    carries_ = {points_.row_of_entry().size(), name};
-    share_ = {points_.sites().size(), name};
-    forces_ = {places.size(), name};
-  }
-  void send_penalties(double dt) {
-    regain_ = sent(points_.regains(dt), name);
-    modulus_ = sent(points_.wave_moduli(), name);
-  }
-  template <class T>
-  DeviceArray<T> sent_span(std::span<const T> values) const {
-    return sent(std::vector<T>(values.begin(), values.end()), name);
+    forces_ = {count, name};
+    motion_ = {points, name};
+    motion_.clear();
+    velocity_ = {points, name};
+    velocity_.clear();
+    share_ = {points, name};
+    touch_ = {rows, name};
+    response_ = {rows, name};
+    force_ = {rows, name};
+    carries_ = {lists().near.size(), name};
+    if (!pushes_) return;
+    regain_ = points_.regains(dt);
+    modulus_ = points_.wave_moduli();
   }
 
   /// Launches a group of threads for each of `count` rows or points.
@@ -257,22 +222,19 @@ class DeviceBodyContacts {
     kernel<<<blocks, threads, 0, m_.stream()>>>(arguments...);
     m_.launched(kernel_name, blocks, threads);
   }
-  /// Gives points of other ranks the values that their owners have, through the host.
   template <class T>
   void refresh(DeviceArray<T>& of_points) {
     m_.wait();
-    std::vector<T> values = fetched(of_points);
-    points_.refresh(values);
-    of_points.upload(values.data());
+    points_.refresh(of_points);
   }
 
   SurfacePlaces<Real> places() const {
-    return {.place = place_.data(),
-            .position = position_.data(),
-            .site = site_.data(),
-            .centre = centre_.data(),
-            .body = body_.data(),
-            .entry = entry_.data(),
+    return {.place = own().place.data(),
+            .position = own().position.data(),
+            .site = lists().site.data(),
+            .centre = own().centre.data(),
+            .body = own().body.data(),
+            .entry = own().entry.data(),
             .gradients = gradients_.data(),
             .stride = stride(),
             .motion = motion_.data(),
@@ -281,17 +243,17 @@ class DeviceBodyContacts {
             .count = count()};
   }
   ContactPasses passes() const {
-    return {.site = site_.data(),
+    return {.site = lists().site.data(),
             .motion = motion_.data(),
             .velocity = velocity_.data(),
-            .row = rows_.data(),
-            .near_start = near_start_.data(),
-            .near = near_.data(),
-            .row_of_entry = row_of_entry_.data(),
-            .entries_of_start = entries_of_start_.data(),
-            .entries_of = entries_of_.data(),
-            .rows_from_start = rows_from_start_.data(),
-            .rows_from = rows_from_.data(),
+            .row = lists().rows.data(),
+            .near_start = lists().near_start.data(),
+            .near = lists().near.data(),
+            .row_of_entry = lists().row_of_entry.data(),
+            .entries_of_start = lists().entries_of_start.data(),
+            .entries_of = lists().entries_of.data(),
+            .rows_from_start = lists().rows_from_start.data(),
+            .rows_from = lists().rows_from.data(),
             .field = fields_.data(),
             .touch = touch_.data(),
             .response = response_.data(),
@@ -302,7 +264,8 @@ class DeviceBodyContacts {
   }
 
   DeviceModel<Real, StateReal>& m_;
-  TouchingPoints points_;
+  SurfaceLayer layer_;
+  DeviceTouchingPoints points_;
   LayerWatch watch_;
   bool pushes_;    // true if bodies act by penalties
   bool rubs_;      // true if some of these have friction
@@ -314,19 +277,12 @@ class DeviceBodyContacts {
   DeviceArray<Vec3<double>> layer_position_, layer_found_;
   DeviceArray<Index> group_begin_, group_end_;  // groups of the layer
   DeviceArray<double> ways_;                    // of these groups
-  // Of this device's points.
-  DeviceArray<Index> place_, body_, entry_, tiles_;
-  DeviceArray<Vec3<double>> position_, centre_;
-  DeviceArray<Real> gradients_;
-  DeviceArray<PointForces> forces_;
-  DeviceArray<double> regain_, modulus_;  // of penalties; empty without them
+  DeviceArray<Real> gradients_;                 // of this device's points
+  DeviceArray<PointForces> forces_;             // on them
+  DeviceArray<double> regain_, modulus_;        // of penalties; empty without them
   // As of `ContactPasses`.
-  DeviceArray<SurfaceSite> site_;
   DeviceArray<SurfaceMotion> motion_;
   DeviceArray<Vec3<double>> velocity_;
-  DeviceArray<ContactRow> rows_;
-  DeviceArray<Index> near_, row_of_entry_, entries_of_, rows_from_;
-  DeviceArray<Offset> near_start_, entries_of_start_, rows_from_start_;
   DeviceArray<SurfaceShare> carries_;
   DeviceArray<SurfaceTouch> touch_;
   DeviceArray<SurfaceResponse> response_;

@@ -12,16 +12,16 @@
 namespace phyxel {
 
 /// True if two boxes have a point in common.
-inline bool overlap(const Box& a, const Box& b) {
+PHYXEL_HD bool overlap(const Box& a, const Box& b) {
   return a.low.x <= b.high.x && b.low.x <= a.high.x && a.low.y <= b.high.y && b.low.y <= a.high.y &&
          a.low.z <= b.high.z && b.low.z <= a.high.z;
 }
 
 /// True if a point is in a box.
-inline bool contains(const Box& box, Vec3d x) { return overlap(box, {x, x}); }
+PHYXEL_HD bool contains(const Box& box, Vec3d x) { return overlap(box, {x, x}); }
 
 /// The box with a margin added on all sides [m].
-inline Box grown(const Box& box, double margin) {
+PHYXEL_HD Box grown(const Box& box, double margin) {
   const Vec3d by{margin, margin, margin};
   return {box.low - by, box.high + by};
 }

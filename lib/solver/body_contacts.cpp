@@ -13,8 +13,9 @@ namespace phyxel {
 BodyContacts::BodyContacts(const Model& model, int threads)
     : model_(model),
       threads_(threads),
-      points_(model),
-      watch_(model, threads),
+      layer_(model),
+      points_(layer_),
+      watch_(layer_, threads),
       pushes_(has_body_penalties(model)) {
   if (!acts()) return;
   rubs_ = pushes_ && has_body_friction(model.body_contact);
@@ -26,7 +27,7 @@ BodyContacts::BodyContacts(const Model& model, int threads)
 
 void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
   points_.find(position, dt);
-  watch_.found(std::move(position), points_.skin());
+  watch_.found(std::move(position), points_.reach());
   const std::size_t points = points_.sites().size(), rows = points_.rows().size();
   motion_.assign(points, {});
   velocity_.assign(points, {});
@@ -180,7 +181,8 @@ std::size_t BodyContacts::bytes() const {
     const bool is_new = of_body && counted.insert(of_body.arrays.get()).second;
     if (is_new) distances += of_body.arrays->bytes();
   }
-  return distances + points_.bytes() + sums_.size() * sizeof(ExactSum) + watch_.bytes() +
+  return distances + layer_.bytes() + points_.bytes() + sums_.size() * sizeof(ExactSum) +
+         watch_.bytes() +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(Vec3d) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
          carries_.size() * sizeof(SurfaceShare) + 2 * forces_.size() * sizeof(PointForces) +

@@ -10,7 +10,9 @@
 #include "phyxel/neighbourhood.hpp"
 #include "solver/contact_search.hpp"
 #include "solver/contact_watch.hpp"
+#include "solver/point_exchange.hpp"
 #include "solver/step_sums.hpp"
+#include "solver/surface_layer.hpp"
 
 namespace phyxel {
 
@@ -18,14 +20,16 @@ namespace phyxel {
 /// The points of this rank come first, then the points of other ranks.
 class TouchingPoints {
  public:
-  /// @param model must outlive this
-  explicit TouchingPoints(const Model& model);
+  /// @param layer must outlive this
+  explicit TouchingPoints(const SurfaceLayer& layer) : model_(layer.model()), layer_(layer) {}
 
   /// Finds them anew from places. Of a share: collective. @param dt size of the step [s]
   void find(std::span<const Vec3d> position, double dt);
 
-  /// Twice the distance by which phyxels may move before they have to be found anew [m].
-  double skin() const { return skin_; }
+  /// As of `SurfaceLayer` [m].
+  double skin() const { return layer_.skin(); }
+  /// Where bodies were when points were found.
+  const BodyReach& reach() const { return reach_; }
 
   /// Numbers, in the layer, of this rank's points.
   std::span<const Index> own() const { return own_; }
@@ -48,11 +52,13 @@ class TouchingPoints {
   /// The modulus of pressure waves of each point [Pa]. Of a share: collective.
   std::vector<double> wave_moduli() const;
   /// 1 over what the damping of a step of `dt` [s] keeps of a velocity, of this rank's points.
-  std::vector<double> regains(double dt) const;
+  std::vector<double> regains(double dt) const { return of_own(layer_.regains(dt)); }
   /// Gives the points of other ranks the values that their owners have: motions, or vectors. Of a
   /// share: collective. @param of_points shape [points]
   template <class T>
-  void refresh(std::vector<T>& of_points) const;
+  void refresh(std::vector<T>& of_points) const {
+    exchange_.refresh(of_points);
+  }
 
   std::size_t bytes() const;
 
@@ -60,10 +66,12 @@ class TouchingPoints {
   std::vector<ContactCandidate> candidates(std::span<const Vec3d> position, double dt) const;
   void keep_what_counts(const std::vector<ContactCandidate>& all, ContactRows found);
   void invert();
+  std::vector<double> of_own(const std::vector<double>& of_layer) const;
 
   const Model& model_;
-  std::vector<SurfaceSite> layer_;  // with 1 along free axes and 0 along others as mobility
-  double skin_ = 0;
+  const SurfaceLayer& layer_;
+  BodyReach reach_;
+  PointExchange exchange_;
   std::vector<Index> own_;
   std::vector<SurfaceSite> site_;
   std::vector<Index> id_;  // of each point, in the whole model
@@ -72,8 +80,6 @@ class TouchingPoints {
   std::vector<Index> row_of_entry_;
   Csr entries_of_, rows_from_;
   bool any_ = false;
-  std::vector<std::vector<Index>> send_;     // points of this rank, by rank
-  std::vector<std::vector<Index>> receive_;  // points of other ranks, by rank
 };
 
 /// Keeps the bodies of a model out of each other, step by step, and adds up what they do.
@@ -254,6 +260,7 @@ class BodyContacts {
 
   const Model& model_;
   int threads_;
+  SurfaceLayer layer_;
   TouchingPoints points_;
   std::vector<PlacedDistances> fields_;  // of each body of the scene
   StepSums sums_;

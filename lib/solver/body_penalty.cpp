@@ -17,7 +17,7 @@ constexpr double reach = 0.25;  // gap of points that may touch before the next 
 
 }  // namespace
 
-BodyPenalty::BodyPenalty(const Model& model) : model_(model), points_(model) {
+BodyPenalty::BodyPenalty(const Model& model) : model_(model), layer_(model), points_(layer_) {
   if (empty()) return;
   for (const auto& distances : model.body_contact.distances) {
     fields_.push_back(distances ? distances.view() : PlacedDistances{});

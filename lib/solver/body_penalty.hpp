@@ -128,6 +128,7 @@ class BodyPenalty {
   std::vector<double> pushes(const Vector& u) const;
 
   const Model& model_;
+  SurfaceLayer layer_;
   TouchingPoints points_;
   std::vector<PlacedDistances> fields_;  // of each body of the scene
   std::vector<double> modulus_;          // of pressure waves, of each point [Pa]

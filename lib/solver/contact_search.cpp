@@ -5,28 +5,12 @@
 #include <cstring>
 #include <tuple>
 
-#include "model/body_contact.hpp"
-#include "model/box_overlaps.hpp"
-#include "model/contact_groups.hpp"
-#include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
 #include "rank_exchange.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
-
-Box together(const Box& a, const Box& b) {
-  return {
-      {std::min(a.low.x, b.low.x), std::min(a.low.y, b.low.y), std::min(a.low.z, b.low.z)},
-      {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y), std::max(a.high.z, b.high.z)}};
-}
-
-/// Parts of one body that are nearer to each other at rest, in ranges, do not touch.
-constexpr double ranges_apart = 2;
-
-/// The part of a list that a phyxel is in.
-int part_of_list(const ContactCandidate& point) { return point.id % contact_threads; }
 
 /// The phyxels near a point, of bodies that it may touch.
 class Neighbours {
@@ -45,12 +29,8 @@ class Neighbours {
     std::vector<Index> found;
     hash_.visit_ball(point.now, reach_, [&](const SpatialHash::Entry& entry) {
       const ContactCandidate& other = points_[static_cast<std::size_t>(entry.index)];
-      const double range = common_range(point.site.range, other.site.range);
-      if (norm(other.now - point.now) > range + skin_) return;
-      if (!contact_.law_of(point.body, other.body)) return;
-      const bool are_apart = point.body != other.body ||
-                             norm(other.site.rest - point.site.rest) > ranges_apart * range;
-      if (are_apart) found.push_back(entry.index);
+      if (!is_near(point, other, skin_)) return;
+      if (contact_.law_of(point.body, other.body)) found.push_back(entry.index);
     });
     std::sort(found.begin(), found.end(), [&](Index a, Index b) {
       return std::tuple(points_[a].body, part_of_list(points_[a]), a) <
@@ -87,22 +67,17 @@ Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries)
   return csr;
 }
 
-std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
-                                 std::span<const SurfaceSite> sites, double skin) {
-  const BodyContact& contact = model.body_contact;
-  std::vector<Box> boxes(contact.distances.size(), no_box);
-  for (std::size_t k = 0; k < position.size(); ++k) {
-    Box& box = boxes[part_of(model, contact.layer.phyxels[k]).body];
-    box = together(box, grown({position[k], position[k]}, sites[k].range + 0.5 * skin));
-  }
-  if (!model.share) return boxes;
+std::vector<ContactCandidate> of_all_ranks(const Model& model, std::vector<ContactCandidate> some) {
+  if (!model.share) return some;
   const Communicator& ranks = *model.share->communicator;
-  const std::vector<std::vector<Box>> all =
-      exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), boxes));
-  for (const std::vector<Box>& some : all) {
-    for (std::size_t b = 0; b < boxes.size(); ++b) boxes[b] = together(boxes[b], some[b]);
+  std::vector<ContactCandidate> all;
+  for (const auto& of_rank :
+       exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), some))) {
+    all.insert(all.end(), of_rank.begin(), of_rank.end());
   }
-  return boxes;
+  std::sort(all.begin(), all.end(),
+            [](const ContactCandidate& a, const ContactCandidate& b) { return a.id < b.id; });
+  return all;
 }
 
 ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandidate> points,
@@ -115,16 +90,12 @@ ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandida
       tabulated(points.size(), [&](std::size_t p) { return neighbours.of(p); });
   for (std::size_t p = 0; p < points.size(); ++p) {
     for (const Index k : near[p]) {
-      // Points far apart would press on a fine surface like nails; it has points of its own.
-      constexpr double coarser = 1.5;
-      if (points[p].site.range > coarser * points[k].site.range) continue;
       const Index body = points[k].body;
       const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
                           found.rows.back().body != body;
       if (is_new) {
-        const bool is_own = body == points[p].body;
-        found.rows.push_back({static_cast<Index>(p), body, *contact.law_of(points[p].body, body),
-                              is_own ? ranges_apart * points[p].site.range : 0});
+        found.rows.push_back(
+            row_of(points[p], static_cast<Index>(p), body, *contact.law_of(points[p].body, body)));
       }
       entries.emplace_back(
           contact_threads * static_cast<Index>(found.rows.size() - 1) + part_of_list(points[k]), k);

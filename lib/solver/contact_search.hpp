@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "model/box.hpp"
+#include "model/box_overlaps.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/neighbourhood.hpp"
 #include "solver/contact_passes.hpp"
@@ -39,12 +40,41 @@ struct ContactRows {
 /// each
 Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries);
 
-/// The boxes of the layer's phyxels of each body, grown by their ranges and half a
-/// skin: bodies whose boxes do not overlap are out of each other's range. Of a share: collective.
-/// @param position of each phyxel of the layer [m]
-/// @param sites of each
-std::vector<Box> boxes_of_bodies(const Model& model, std::span<const Vec3d> position,
-                                 std::span<const SurfaceSite> sites, double skin);
+/// Parts of one body that are nearer to each other at rest, in ranges, do not touch.
+inline constexpr double ranges_apart = 2;
+
+/// The part of a list that a phyxel is in.
+PHYXEL_HD int part_of_list(const ContactCandidate& point) { return point.id % contact_threads; }
+
+/// True if a phyxel of a surface comes into the list of a point, if their bodies touch.
+PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& other, double skin) {
+  // Points far apart would press on a fine surface like nails; it has points of its own.
+  constexpr double coarser = 1.5;
+  if (point.site.range > coarser * other.site.range) return false;
+  const double range = common_range(point.site.range, other.site.range);
+  const auto is_within = [](Vec3d way, double distance) {
+    return dot(way, way) <= distance * distance;
+  };
+  if (!is_within(other.now - point.now, range + skin)) return false;
+  return point.body != other.body ||
+         !is_within(other.site.rest - point.site.rest, ranges_apart * range);
+}
+
+/// The row of a point beside a body.
+PHYXEL_HD ContactRow row_of(const ContactCandidate& point, Index number, Index body,
+                            const ContactLaw& law) {
+  return {number, body, law, body == point.body ? ranges_apart * point.site.range : 0};
+}
+
+/// True if a phyxel of a surface may be near a body whose phyxels are in a box.
+/// @param box grown by the ranges of its phyxels
+PHYXEL_HD bool may_be_near(Vec3d now, double range, double skin, const Box& box) {
+  return overlap(grown({now, now}, range + 0.5 * skin), grown(box, 0.5 * skin));
+}
+
+/// The candidates of all ranks, ascending by their ids. Of a share: collective. @param some those
+/// of this rank
+std::vector<ContactCandidate> of_all_ranks(const Model& model, std::vector<ContactCandidate> some);
 
 /// Finds the rows of points with phyxels of other bodies' surfaces within the common range and a
 /// skin. @param points ascending by their ids

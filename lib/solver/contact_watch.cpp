@@ -2,11 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
-#include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
-#include "model/parts.hpp"
 
 namespace phyxel {
 namespace {
@@ -51,12 +48,11 @@ bool ContactWatch::look(const Model& model, double moved, double fastest, double
   return is_late;
 }
 
-LayerWatch::LayerWatch(const Model& model, int threads, int rarest)
-    : model_(model),
-      groups_(groups_of(model, model.body_contact.layer)),
-      threads_(std::clamp(static_cast<int>(layer().size() / 4000), 1, threads)),
+LayerWatch::LayerWatch(const SurfaceLayer& layer, int threads, int rarest)
+    : layer_(layer),
+      threads_(std::clamp(static_cast<int>(layer.phyxels().size() / 4000), 1, threads)),
       watch_(rarest),
-      ways_(groups_.size()) {}
+      ways_(layer.groups().size()) {}
 
 bool LayerWatch::is_late_on_ranks(double dt, double skin) {
   double moved = 0, fastest = 0;
@@ -64,7 +60,7 @@ bool LayerWatch::is_late_on_ranks(double dt, double skin) {
     moved = std::max(moved, largest_in(way.moved));
     fastest = std::max(fastest, largest_in(way.speeds));
   }
-  return watch_.look(model_, moved, fastest, skin, dt);
+  return watch_.look(layer_.model(), moved, fastest, skin, dt);
 }
 
 bool LayerWatch::is_late_here(double dt, double skin) {
@@ -76,48 +72,32 @@ bool LayerWatch::is_late_here(double dt, double skin) {
 
 // Until the next look, the speeds of bodies against each other may double.
 bool LayerWatch::have_come_near(double dt, double skin) const {
-  std::vector<Box> ways(boxes_.size(), no_box);  // up to the next look
+  const BodyContact& contact = layer_.model().body_contact;
+  std::vector<Box> ways(reach_.boxes.size(), no_box);  // up to the next look
   const double span = watch_.rarest() * dt;
-  for (std::size_t g = 0; g < groups_.size(); ++g) {
+  for (std::size_t g = 0; g < ways_.size(); ++g) {
     const Box way = sum_of(ways_[g].moved, ways_[g].speeds, 2 * span);
-    Box& of_body = ways[part_of(model_, layer()[groups_[g].begin]).body];
+    Box& of_body = ways[layer_.bodies()[layer_.groups()[g].begin]];
     extend(of_body, way.low);
     extend(of_body, way.high);
   }
-  std::vector<Box> boxes = boxes_;
+  std::vector<Box> boxes = reach_.boxes;
   for (std::size_t b = 0; b < boxes.size(); ++b) {
     if (boxes[b].low.x <= boxes[b].high.x) boxes[b] = sum_of(boxes[b], ways[b]);
   }
   bool is_late = false;
   const auto look_at = [&](std::size_t a, std::size_t b) {
     const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
-    const bool were_near = std::binary_search(partners_[a].begin(), partners_[a].end(), second);
+    const std::vector<Index>& near = reach_.partners[a];
+    const bool were_near = std::binary_search(near.begin(), near.end(), second);
     is_late = is_late || (were_near ? largest_difference(ways[a], ways[b]) > skin
-                                    : model_.body_contact.law_of(first, second) != nullptr);
+                                    : contact.law_of(first, second) != nullptr);
   };
   for_each_overlap(boxes, look_at);
-  for (std::size_t b = 0; b < boxes.size() && model_.body_contact.self; ++b) {
+  for (std::size_t b = 0; b < boxes.size() && contact.self; ++b) {
     if (boxes[b].low.x <= boxes[b].high.x) look_at(b, b);
   }
   return is_late;
-}
-
-void LayerWatch::found(std::vector<Vec3d> position, double skin) {
-  found_at_ = std::move(position);
-  if (model_.share) return;
-  boxes_.assign(model_.body_contact.distances.size(), no_box);
-  for (const LayerGroup& group : groups_) {
-    Box& box = boxes_[part_of(model_, layer()[group.begin]).body];
-    for (std::size_t k = group.begin; k < group.end; ++k) {
-      const double range = model_.neighbourhood.support[layer()[k]];
-      const Box around = grown({found_at_[k], found_at_[k]}, range);
-      extend(box, around.low);
-      extend(box, around.high);
-    }
-  }
-  std::vector<Box> with_skin;
-  for (const Box& box : boxes_) with_skin.push_back(grown(box, 0.5 * skin));
-  partners_ = partners_of_bodies(model_.body_contact, with_skin);
 }
 
 }  // namespace phyxel

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "model/box.hpp"
-#include "model/contact_groups.hpp"
 #include "phyxel/model.hpp"
+#include "solver/surface_layer.hpp"
 
 namespace phyxel {
 
@@ -61,19 +61,17 @@ struct SurfaceWay {
 /// points, however fast they are, nor do bodies far from each other.
 class LayerWatch {
  public:
-  /// @param model must outlive this. @param threads most threads that share the work
+  /// @param layer must outlive this. @param threads most threads that share the work
   /// @param rarest most steps between two looks (`ContactWatch`)
-  LayerWatch(const Model& model, int threads, int rarest = 1);
+  LayerWatch(const SurfaceLayer& layer, int threads, int rarest = 1);
 
-  /// The groups of the layer, in its order.
-  const std::vector<LayerGroup>& groups() const { return groups_; }
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return watch_.is_due(dt); }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param ways of the groups since points were found; not looked at before that
   bool is_late_by(std::vector<SurfaceWay> ways, double dt, double skin) {
     ways_ = std::move(ways);
-    return model_.share ? is_late_on_ranks(dt, skin) : is_late_here(dt, skin);
+    return layer_.model().share ? is_late_on_ranks(dt, skin) : is_late_here(dt, skin);
   }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param skin as of `TouchingPoints` [m]. @param state_of returns the state of a phyxel
@@ -81,12 +79,12 @@ class LayerWatch {
   bool is_late(double dt, double skin, StateOf&& state_of) {
     if (!found_at_.empty()) {
 #pragma omp parallel for schedule(static) num_threads(threads_)
-      for (std::size_t g = 0; g < groups_.size(); ++g) {
+      for (std::size_t g = 0; g < ways_.size(); ++g) {
         SurfaceWay way;
-        for (std::size_t k = groups_[g].begin; k < groups_[g].end; ++k) {
-          const Index i = layer()[k];
+        for (std::size_t k = layer_.groups()[g].begin; k < layer_.groups()[g].end; ++k) {
+          const Index i = layer_.phyxels()[k];
           const SurfaceState state = state_of(i);
-          extend(way.moved, model_.position[i] + state.displacement - found_at_[k]);
+          extend(way.moved, layer_.model().position[i] + state.displacement - found_at_[k]);
           extend(way.speeds, state.velocity);
         }
         ways_[g] = way;
@@ -94,29 +92,29 @@ class LayerWatch {
     }
     return is_late_by(std::move(ways_), dt, skin);
   }
-  /// Notes the places at which points are found [m], shape [layer].
-  void found(std::vector<Vec3d> position, double skin);
+  /// Notes where bodies are when points are found.
+  void found(const BodyReach& reach) { reach_ = reach; }
+  /// Notes their phyxels' places, too, which `is_late` with states looks at [m], shape [layer].
+  void found(std::vector<Vec3d> position, const BodyReach& reach) {
+    found_at_ = std::move(position);
+    found(reach);
+  }
   /// A number that changes with each search.
   std::int64_t generation() const { return watch_.generation(); }
   std::size_t bytes() const { return found_at_.size() * sizeof(Vec3d); }
 
  private:
-  const std::vector<Index>& layer() const { return model_.body_contact.layer.phyxels; }
   bool is_late_on_ranks(double dt, double skin);
   bool is_late_here(double dt, double skin);
   /// True if bodies may touch in the next step at places that are not among the points.
   bool have_come_near(double dt, double skin) const;
 
-  const Model& model_;
-  std::vector<LayerGroup> groups_;
+  const SurfaceLayer& layer_;
   int threads_;
   ContactWatch watch_;
   std::vector<Vec3d> found_at_;   // [m], shape [layer]
   std::vector<SurfaceWay> ways_;  // of each group
-  // Of each body of the scene: its box when points were found, grown by the ranges of its phyxels,
-  // and the bodies beside it then, ascending.
-  std::vector<Box> boxes_;
-  std::vector<std::vector<Index>> partners_;
+  BodyReach reach_;               // when points were found
 };
 
 }  // namespace phyxel

@@ -1,0 +1,499 @@
+#include <cub/block/block_reduce.cuh>
+#include <tuple>
+#include <utility>
+
+#include "model/parts.hpp"
+#include "setup/device_hash.cuh"
+#include "setup/primitives.cuh"
+#include "setup/tiling.hpp"
+#include "solver/device_touching_points.hpp"
+#include "timeline.hpp"
+
+namespace phyxel::cuda {
+namespace {
+
+constexpr const char* name = "contact";
+constexpr int group_threads = 256;
+
+/// Finds the box of each group of a layer, grown by the ranges of its phyxels. One block per group.
+__global__ void find_boxes(const Vec3d* position, const SurfaceSite* site, const Index* begin,
+                           const Index* end, Box* boxes) {
+  Box box = no_box;
+  const AroundBoth around;
+  for (Index k = begin[blockIdx.x] + static_cast<Index>(threadIdx.x); k < end[blockIdx.x];
+       k += group_threads) {
+    box = around(box, grown({position[k], position[k]}, site[k].range));
+  }
+  using Reduce = cub::BlockReduce<Box, group_threads>;
+  __shared__ typename Reduce::TempStorage memory;
+  const Box all = Reduce(memory).Reduce(box, around);
+  if (threadIdx.x == 0) boxes[blockIdx.x] = all;
+}
+
+/// The layer and the bodies as kernels see them.
+struct LayerView {
+  const Vec3d* position;
+  const SurfaceSite* site;
+  const double* gain;
+  const Index *id, *body;
+  const Box* box;  ///< Of bodies.
+  const Index *partner_start, *partner;
+  const ContactLaw* law;  ///< Of partners.
+  double skin;
+  int rank;
+
+  /// The number of a body among the partners of all; -1 if two do not touch.
+  __device__ Index partner_of(Index body, Index other) const {
+    for (Index k = partner_start[body]; k < partner_start[body + 1]; ++k) {
+      if (partner[k] == other) return k;
+    }
+    return -1;
+  }
+  __device__ bool is_near_others(Index k) const {
+    for (Index p = partner_start[body[k]]; p < partner_start[body[k] + 1]; ++p) {
+      if (may_be_near(position[k], site[k].range, skin, box[partner[p]])) return true;
+    }
+    return false;
+  }
+};
+
+/// What the search for entries reads.
+struct Near {
+  LayerView layer;
+  HashView hash;
+  const ContactCandidate* points;
+  double reach;
+
+  /// Calls visit(k) for each candidate in the lists of a point.
+  template <class Visit>
+  __device__ void each(Index p, Visit&& visit) const {
+    const ContactCandidate& point = points[p];
+    hash.visit_near(0, point.now, reach, [&](std::uint32_t entry, const Vec3d&) {
+      const Index k = hash.index[entry];
+      const ContactCandidate& other = points[k];
+      if (!is_near(point, other, layer.skin)) return;
+      if (layer.partner_of(point.body, other.body) >= 0) visit(k);
+    });
+  }
+};
+
+struct RangeOf {
+  const ContactCandidate* points;
+  __device__ double operator()(std::int64_t p) const { return points[p].site.range; }
+};
+
+using Candidates = DeviceArray<ContactCandidate>;
+using Numbers = DeviceArray<Index>;
+
+/// Rows and their entries, in terms of candidates.
+struct Found {
+  DeviceArray<std::uint64_t> keys;  ///< Ascending: by point, then as lists are.
+  Numbers near;                     ///< Of each entry: its candidate.
+  Numbers row_of_entry;
+  DeviceArray<ContactRow> rows;  ///< Their points are numbers of candidates.
+};
+
+std::int64_t count_of(std::size_t size) { return static_cast<std::int64_t>(size); }
+
+template <class T>
+DeviceArray<T> cleared(std::size_t count) {
+  DeviceArray<T> array(count, name);
+  array.clear();
+  return array;
+}
+
+/// The candidates of this rank.
+Candidates candidates_of(const LayerView& layer, std::size_t count) {
+  DeviceArray<char> flags(count, name);
+  for_each("choose_candidates", count_of(count),
+           [layer, flags = flags.data()] __device__(std::int64_t k) {
+             flags[k] = layer.is_near_others(static_cast<Index>(k));
+           });
+  const Numbers chosen = flagged_numbers(flags);
+  Candidates some(chosen.size(), name);
+  for_each("make_candidates", count_of(chosen.size()),
+           [layer, chosen = chosen.data(), some = some.data()] __device__(std::int64_t c) {
+             const Index k = chosen[c];
+             ContactCandidate& made = some[c];
+             made.now = layer.position[k];
+             made.site = layer.site[k];
+             made.site.mobility = layer.gain[k] * made.site.mobility;
+             made.id = layer.id[k];
+             made.body = layer.body[k];
+             made.rank = layer.rank;
+             made.place = k;
+           });
+  return some;
+}
+
+/// The candidates in the order that lists have.
+Numbers in_list_order(const Candidates& points, std::size_t bodies) {
+  DeviceArray<std::uint64_t> list(points.size(), name);
+  Numbers by_list(points.size(), name);
+  for_each("list_candidates", count_of(points.size()),
+           [points = points.data(), list = list.data(),
+            by_list = by_list.data()] __device__(std::int64_t p) {
+             list[p] = static_cast<std::uint64_t>(points[p].body) * contact_threads +
+                       static_cast<std::uint64_t>(part_of_list(points[p]));
+             by_list[p] = static_cast<Index>(p);
+           });
+  if (points.size() > 0) sort_pairs(list, by_list, bits_below(contact_threads * bodies));
+  return by_list;
+}
+
+/// The entries of the lists of all candidates: the number of the point times the number of
+/// candidates, plus the place in `by_list` of the candidate near it; ascending.
+DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerView& layer,
+                                         const Numbers& by_list) {
+  const std::size_t n = points.size();
+  if (n == 0) return {};
+  DeviceArray<Vec3d> now(n, name);
+  Numbers order(n, name);
+  for_each("place_candidates", count_of(n),
+           [points = points.data(), now = now.data(), by_list = by_list.data(),
+            order = order.data()] __device__(std::int64_t p) {
+             now[p] = points[p].now;
+             order[by_list[p]] = static_cast<Index>(p);
+           });
+  const thrust::transform_iterator ranges(thrust::counting_iterator<std::int64_t>(0),
+                                          RangeOf{points.data()});
+  const double reach = reduce(ranges, count_of(n), 0.0, Larger{}) + layer.skin;
+  const DeviceHash hash(now, {{0, static_cast<Index>(n), reach}});
+  const Near near{layer, hash.view(), points.data(), reach};
+  DeviceArray<Offset> count(n, name);
+  for_each("count_entries", count_of(n), [near, count = count.data()] __device__(std::int64_t p) {
+    Offset own = 0;
+    near.each(static_cast<Index>(p), [&](Index) { ++own; });
+    count[p] = own;
+  });
+  const DeviceArray<Offset> start = running_sums(count);
+  DeviceArray<std::uint64_t> keys(static_cast<std::size_t>(last_of(start)), name);
+  for_each("find_entries", count_of(n),
+           [near, start = start.data(), order = order.data(), keys = keys.data(),
+            n] __device__(std::int64_t p) {
+             Offset next = start[p];
+             near.each(static_cast<Index>(p), [&](Index k) {
+               keys[next++] =
+                   static_cast<std::uint64_t>(p) * n + static_cast<std::uint64_t>(order[k]);
+             });
+           });
+  if (keys.size() > 0) sort_values(keys, bits_below(n * n));
+  return keys;
+}
+
+/// The rows of entries.
+Found rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
+              const Numbers& by_list) {
+  const std::size_t n = points.size(), entries = keys.size();
+  Found found;
+  found.near = {entries, name};
+  Numbers begins(entries, name);
+  for_each("begin_rows", count_of(entries),
+           [keys = keys.data(), near = found.near.data(), begins = begins.data(),
+            points = points.data(), by_list = by_list.data(), n] __device__(std::int64_t e) {
+             const Index k = by_list[keys[e] % n];
+             near[e] = k;
+             begins[e] = e == 0 || keys[e - 1] / n != keys[e] / n ||
+                         points[by_list[keys[e - 1] % n]].body != points[k].body;
+           });
+  const Numbers sums = running_sums(begins);
+  found.row_of_entry = {entries, name};
+  found.rows = {static_cast<std::size_t>(last_of(sums)), name};
+  for_each("make_rows", count_of(entries),
+           [layer, keys = keys.data(), near = found.near.data(), begins = begins.data(),
+            sums = sums.data(), points = points.data(), row_of_entry = found.row_of_entry.data(),
+            rows = found.rows.data(), n] __device__(std::int64_t e) {
+             const Index row = sums[e + 1] - 1;
+             row_of_entry[e] = row;
+             if (!begins[e]) return;
+             const auto p = static_cast<Index>(keys[e] / n);
+             const Index body = points[near[e]].body;
+             rows[row] =
+                 row_of(points[p], p, body, layer.law[layer.partner_of(points[p].body, body)]);
+           });
+  found.keys = std::move(keys);
+  return found;
+}
+
+/// Flags of the candidates of a rank that are in rows.
+DeviceArray<char> in_rows(const Found& found, const Candidates& points, int rank) {
+  auto flags = cleared<char>(points.size());
+  for_each("flag_points", count_of(found.near.size()),
+           [points = points.data(), near = found.near.data(), row = found.row_of_entry.data(),
+            rows = found.rows.data(), flags = flags.data(), rank] __device__(std::int64_t e) {
+             const Index k = near[e], p = rows[row[e]].point;
+             if (points[k].rank == rank) flags[k] = 1;
+             if (points[p].rank == rank) flags[p] = 1;
+           });
+  return flags;
+}
+
+/// Adds the points of rows that have a flagged one to those. @returns flags of the entries of these
+/// rows
+DeviceArray<char> spread(const Found& found, const DeviceArray<char>& flags) {
+  const std::int64_t entries = count_of(found.near.size());
+  const auto touched = cleared<char>(found.rows.size());
+  for_each("touch_rows", entries,
+           [near = found.near.data(), row = found.row_of_entry.data(), rows = found.rows.data(),
+            flags = flags.data(), touched = touched.data()] __device__(std::int64_t e) {
+             if (flags[near[e]] || flags[rows[row[e]].point]) touched[row[e]] = 1;
+           });
+  DeviceArray<char> of_entry(found.near.size(), name);
+  for_each("spread_rows", entries,
+           [near = found.near.data(), row = found.row_of_entry.data(), rows = found.rows.data(),
+            flags = flags.data(), touched = touched.data(),
+            of_entry = of_entry.data()] __device__(std::int64_t e) {
+             of_entry[e] = touched[row[e]];
+             if (touched[row[e]]) flags[near[e]] = flags[rows[row[e]].point] = 1;
+           });
+  return of_entry;
+}
+
+/// Flags of the chosen candidates that a rank steps, or of the others.
+DeviceArray<char> flags_of(const DeviceArray<char>& chosen, const Candidates& points, int rank,
+                           bool own) {
+  DeviceArray<char> flags(points.size(), name);
+  for_each(
+      "flag_points_of_rank", count_of(points.size()),
+      [points = points.data(), chosen = chosen.data(), flags = flags.data(), rank, own] __device__(
+          std::int64_t p) { flags[p] = chosen[p] && (points[p].rank == rank) == own; });
+  return flags;
+}
+
+/// Entries of lists by list, each list in the order of the entries. @param list of each entry
+/// @returns the starts of the lists, and the entries
+std::pair<DeviceArray<Offset>, Numbers> grouped(Numbers list, std::size_t lists) {
+  Numbers entries(list.size(), name);
+  for_each("number_entries", count_of(list.size()),
+           [entries = entries.data()] __device__(std::int64_t e) {
+             entries[e] = static_cast<Index>(e);
+           });
+  if (list.size() > 0) sort_pairs(list, entries, bits_below(lists));
+  DeviceArray<Offset> starts = starts_of<Offset>(list, lists, name);
+  return {std::move(starts), std::move(entries)};
+}
+
+/// Numbers points: those of this rank first. @param own,other numbers of candidates
+/// @returns the number of each candidate that is a point
+Numbers number_points(const Candidates& points, const Numbers& own, const Numbers& other,
+                      Numbers& layer, DeviceTouchingPoints::Lists& lists) {
+  const std::size_t count = own.size() + other.size();
+  Numbers number(points.size(), name);
+  lists.site = {count, name};
+  lists.id = {count, name};
+  layer = {own.size(), name};
+  for_each("number_points", count_of(count),
+           [points = points.data(), own = own.data(), other = other.data(),
+            owned = count_of(own.size()), number = number.data(), site = lists.site.data(),
+            id = lists.id.data(), layer = layer.data()] __device__(std::int64_t k) {
+             const Index p = k < owned ? own[k] : other[k - owned];
+             number[p] = static_cast<Index>(k);
+             site[k] = points[p].site;
+             id[k] = points[p].id;
+             if (k < owned) layer[k] = points[p].place;
+           });
+  return number;
+}
+
+void set_lists(const Candidates& points, const Numbers& number, Found found,
+               DeviceTouchingPoints::Lists& lists) {
+  const std::size_t entries = found.near.size(), rows = found.rows.size();
+  Numbers list(entries, name), list_of_point(entries, name);
+  for_each("list_entries", count_of(entries),
+           [points = points.data(), number = number.data(), near = found.near.data(),
+            row = found.row_of_entry.data(), rows = found.rows.data(), list = list.data(),
+            of_point = list_of_point.data()] __device__(std::int64_t e) {
+             const Index k = near[e];
+             list[e] = contact_threads * row[e] + part_of_list(points[k]);
+             of_point[e] = contact_threads * number[k] + part_of_list(points[rows[row[e]].point]);
+             near[e] = number[k];
+           });
+  Numbers point(rows, name);
+  for_each("renumber_rows", count_of(rows),
+           [rows = found.rows.data(), number = number.data(),
+            point = point.data()] __device__(std::int64_t r) {
+             rows[r].point = number[rows[r].point];
+             point[r] = rows[r].point;
+           });
+  const std::size_t count = lists.site.size();
+  lists.near_start = starts_of<Offset>(list, contact_threads * rows, name);
+  std::tie(lists.entries_of_start, lists.entries_of) =
+      grouped(std::move(list_of_point), contact_threads * count);
+  std::tie(lists.rows_from_start, lists.rows_from) = grouped(std::move(point), count);
+  lists.rows = std::move(found.rows);
+  lists.near = std::move(found.near);
+  lists.row_of_entry = std::move(found.row_of_entry);
+}
+
+/// Sets the tiles of places, and where these are in them.
+void set_tiles(DeviceTouchingPoints::Own& own, Index tiles) {
+  const std::int64_t count = count_of(own.place.size());
+  const auto used = cleared<char>(static_cast<std::size_t>(tiles));
+  for_each("use_tiles", count,
+           [place = own.place.data(), used = used.data()] __device__(std::int64_t p) {
+             used[place[p] / tile_size] = 1;
+           });
+  own.tiles = flagged_numbers(used);
+  Numbers number(static_cast<std::size_t>(tiles), name);
+  for_each("number_tiles", count_of(own.tiles.size()),
+           [tiles = own.tiles.data(), number = number.data()] __device__(std::int64_t t) {
+             number[tiles[t]] = static_cast<Index>(t);
+           });
+  own.entry = {own.place.size(), name};
+  for_each("place_entries", count,
+           [place = own.place.data(), number = number.data(),
+            entry = own.entry.data()] __device__(std::int64_t p) {
+             entry[p] = number[place[p] / tile_size] * tile_size + place[p] % tile_size;
+           });
+}
+
+/// Entries of an array of the layer. @param numbers of these entries in the layer
+template <class T>
+DeviceArray<T> gathered(const DeviceArray<T>& of_layer, const Numbers& numbers) {
+  DeviceArray<T> some(numbers.size(), name);
+  for_each("gather", count_of(numbers.size()),
+           [all = of_layer.data(), some = some.data(),
+            numbers = numbers.data()] __device__(std::int64_t p) { some[p] = all[numbers[p]]; });
+  return some;
+}
+
+}  // namespace
+
+DeviceTouchingPoints::DeviceTouchingPoints(const SurfaceLayer& layer,
+                                           const std::vector<Index>& place, Index tiles)
+    : layer_(layer), tiles_(tiles) {
+  const Model& model = layer.model();
+  std::vector<Index> ids, begin, end;
+  std::vector<Vec3d> centres, rest;
+  for (const Index i : layer.phyxels()) {
+    ids.push_back(model.global_id(i));
+    centres.push_back(part_of(model, i).centre);
+    rest.push_back(model.position[i]);
+  }
+  for (const LayerGroup& group : layer.groups()) {
+    begin.push_back(static_cast<Index>(group.begin));
+    end.push_back(static_cast<Index>(group.end));
+  }
+  site_ = sent(layer.sites(), name);
+  place_ = sent(place, name);
+  id_ = sent(ids, name);
+  body_ = sent(layer.bodies(), name);
+  rest_ = sent(rest, name);
+  centre_ = sent(centres, name);
+  group_begin_ = sent(begin, name);
+  group_end_ = sent(end, name);
+}
+
+std::vector<Box> DeviceTouchingPoints::boxes_of_groups(const DeviceArray<Vec3d>& position) const {
+  const auto groups = static_cast<unsigned>(group_begin_.size());
+  if (groups == 0) return {};
+  const DeviceArray<Box> boxes(groups, name);
+  find_boxes<<<groups, group_threads>>>(position.data(), site_.data(), group_begin_.data(),
+                                        group_end_.data(), boxes.data());
+  check_launch({"find_boxes", groups, group_threads, name});
+  return fetched(boxes);
+}
+
+void DeviceTouchingPoints::send_reach() {
+  const BodyContact& contact = layer_.model().body_contact;
+  std::vector<Index> start{0}, partners;
+  std::vector<ContactLaw> laws;
+  for (std::size_t b = 0; b < reach_.partners.size(); ++b) {
+    for (const Index other : reach_.partners[b]) {
+      partners.push_back(other);
+      laws.push_back(*contact.law_of(static_cast<Index>(b), other));
+    }
+    start.push_back(static_cast<Index>(partners.size()));
+  }
+  box_ = sent(reach_.boxes, name);
+  partner_start_ = sent(start, name);
+  partner_ = sent(partners, name);
+  partner_law_ = sent(laws, name);
+}
+
+void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt) {
+  const Phase phase("points that may touch");
+  const PooledMemory pooled;
+  if (dt != dt_) {
+    gain_ = sent(layer_.gains(dt), name);
+    dt_ = dt;
+  }
+  reach_ = layer_.reach_of(boxes_of_groups(position));
+  send_reach();
+  const Model& model = layer_.model();
+  const int rank = model.share ? model.share->communicator->rank() : 0;
+  const LayerView layer{position.data(),
+                        site_.data(),
+                        gain_.data(),
+                        id_.data(),
+                        body_.data(),
+                        box_.data(),
+                        partner_start_.data(),
+                        partner_.data(),
+                        partner_law_.data(),
+                        layer_.skin(),
+                        rank};
+  Candidates points = candidates_of(layer, position.size());
+  if (model.share) points = sent(of_all_ranks(model, fetched(points)), name);
+  const Numbers by_list = in_list_order(points, reach_.boxes.size());
+  Found found = rows_of(entries_among(points, layer, by_list), points, layer, by_list);
+  any_ = found.rows.size() > 0;
+  const DeviceArray<char> chosen = in_rows(found, points, rank);
+  if (model.share) {  // as of `phyxel::TouchingPoints`
+    spread(found, chosen);
+    const DeviceArray<char> kept = spread(found, chosen);
+    found = rows_of(flagged<const std::uint64_t*, std::uint64_t>(found.keys.data(), kept), points,
+                    layer, by_list);
+  }
+  const Numbers own = flagged_numbers(flags_of(chosen, points, rank, true));
+  const Numbers other = flagged_numbers(flags_of(chosen, points, rank, false));
+  const Numbers number = number_points(points, own, other, own_.layer, lists_);
+  set_lists(points, number, std::move(found), lists_);
+  own_.place = gathered(place_, own_.layer);
+  own_.body = gathered(body_, own_.layer);
+  own_.position = gathered(rest_, own_.layer);
+  own_.centre = gathered(centre_, own_.layer);
+  set_tiles(own_, tiles_);
+  if (model.share) plan_exchange(points, other);
+  PHYXEL_CUDA(cudaStreamSynchronize(cudaStreamLegacy));
+}
+
+void DeviceTouchingPoints::plan_exchange(const Candidates& points, const Numbers& other) {
+  const Communicator& ranks = *layer_.model().share->communicator;
+  std::vector<std::vector<Index>> wanted(static_cast<std::size_t>(ranks.size()));
+  std::vector<std::vector<Index>> receive(wanted.size());
+  const std::vector<ContactCandidate> all = fetched(points);
+  auto next = static_cast<Index>(own_.layer.size());
+  for (const Index p : fetched(other)) {
+    wanted[all[p].rank].push_back(all[p].place);
+    receive[all[p].rank].push_back(next++);
+  }
+  exchange_ = {ranks, wanted, std::move(receive), fetched(own_.layer)};
+}
+
+DeviceArray<double> DeviceTouchingPoints::of_own(const std::vector<double>& of_layer) const {
+  const PooledMemory pooled;
+  DeviceArray<double> some = gathered(sent(of_layer, name), own_.layer);
+  PHYXEL_CUDA(cudaStreamSynchronize(cudaStreamLegacy));
+  return some;
+}
+
+DeviceArray<double> DeviceTouchingPoints::wave_moduli() const {
+  DeviceArray<double> own = of_own(layer_.wave_moduli());
+  if (!layer_.model().share) return own;
+  std::vector<double> all = fetched(own);
+  all.resize(lists_.site.size());
+  exchange_.refresh(all);
+  return sent(all, name);
+}
+
+std::size_t DeviceTouchingPoints::bytes() const {
+  const auto sum = [](const auto&... arrays) { return (arrays.bytes() + ...); };
+  return sum(own_.layer, own_.place, own_.tiles, own_.entry, own_.body, own_.position, own_.centre,
+             lists_.site, lists_.id, lists_.rows, lists_.near, lists_.row_of_entry,
+             lists_.entries_of, lists_.rows_from, lists_.near_start, lists_.entries_of_start,
+             lists_.rows_from_start, site_, gain_, place_, id_, body_, rest_, centre_, group_begin_,
+             group_end_, box_, partner_start_, partner_, partner_law_);
+}
+
+}  // namespace phyxel::cuda

@@ -1,0 +1,96 @@
+/// The search on the device for points of surfaces that may touch other bodies soon.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "check.hpp"
+#include "solver/contact_search.hpp"
+#include "solver/point_exchange.hpp"
+#include "solver/surface_layer.hpp"
+
+namespace phyxel::cuda {
+
+/// The points and lists of `phyxel::TouchingPoints`, equal to those, in device memory. Only bodies'
+/// boxes, and with ranks the candidates, are known to the host.
+class DeviceTouchingPoints {
+ public:
+  /// The points of this device, which come first, shape [count] each.
+  struct Own {
+    DeviceArray<Index> layer;  ///< Numbers in the layer.
+    DeviceArray<Index> place;  ///< Tile slots.
+    DeviceArray<Index> tiles;  ///< The tiles of these slots, ascending, each once; shape [tiles].
+    /// Where a point is in these tiles: the number of its tile in `tiles` times the size of a tile,
+    /// and its place in the tile.
+    DeviceArray<Index> entry;
+    DeviceArray<Index> body;      ///< Numbers of their bodies.
+    DeviceArray<Vec3d> position;  ///< At rest [m].
+    DeviceArray<Vec3d> centre;    ///< Centre of mass of their bodies, at rest [m].
+  };
+  /// Lists of `ContactPasses`, and the points that they name.
+  struct Lists {
+    DeviceArray<SurfaceSite> site;  ///< Shape [points].
+    DeviceArray<Index> id;          ///< Shape [points].
+    DeviceArray<ContactRow> rows;
+    DeviceArray<Index> near, row_of_entry, entries_of, rows_from;
+    DeviceArray<Offset> near_start, entries_of_start, rows_from_start;
+  };
+
+  /// @param layer must outlive this. @param place tile slots of its phyxels
+  /// @param tiles number of tiles
+  DeviceTouchingPoints(const SurfaceLayer& layer, const std::vector<Index>& place, Index tiles);
+
+  /// Finds them anew from places [m], shape [layer]. Of a share: collective.
+  /// @param dt size of the step [s]
+  void find(const DeviceArray<Vec3d>& position, double dt);
+
+  const Own& own() const { return own_; }
+  const Lists& lists() const { return lists_; }
+  /// True if there are rows on any rank.
+  bool any() const { return any_; }
+  /// Where bodies were when points were found.
+  const BodyReach& reach() const { return reach_; }
+
+  /// As of `phyxel::TouchingPoints`. Of a share: collective.
+  DeviceArray<double> wave_moduli() const;
+  DeviceArray<double> regains(double dt) const { return of_own(layer_.regains(dt)); }
+  /// Gives the points of other ranks the values that their owners have, through the host. Of a
+  /// share: collective. @param of_points shape [points]
+  template <class T>
+  void refresh(const DeviceArray<T>& of_points) const {
+    if (!layer_.model().share) return;
+    std::vector<T> values(of_points.size());
+    of_points.download(values.data());
+    exchange_.refresh(values);
+    of_points.upload(values.data());
+  }
+
+  std::size_t bytes() const;
+
+ private:
+  std::vector<Box> boxes_of_groups(const DeviceArray<Vec3d>& position) const;
+  void send_reach();
+  DeviceArray<double> of_own(const std::vector<double>& of_layer) const;
+  void plan_exchange(const DeviceArray<ContactCandidate>& points, const DeviceArray<Index>& other);
+
+  const SurfaceLayer& layer_;
+  Index tiles_;
+  double dt_ = -1;  // of the gains [s]
+  BodyReach reach_;
+  PointExchange exchange_;
+  bool any_ = false;
+  Own own_;
+  Lists lists_;
+  // Of the layer.
+  DeviceArray<SurfaceSite> site_;
+  DeviceArray<double> gain_;
+  DeviceArray<Index> place_, id_, body_;
+  DeviceArray<Vec3d> rest_, centre_;
+  DeviceArray<Index> group_begin_, group_end_;
+  // Of the bodies: their boxes and whom they may touch.
+  DeviceArray<Box> box_;
+  DeviceArray<Index> partner_start_, partner_;
+  DeviceArray<ContactLaw> partner_law_;
+};
+
+}  // namespace phyxel::cuda

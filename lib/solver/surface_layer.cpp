@@ -1,0 +1,123 @@
+#include "solver/surface_layer.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "mesh/distance_field.hpp"
+#include "model/body_contact.hpp"
+#include "model/box_overlaps.hpp"
+#include "model/parts.hpp"
+#include "phyxel/law_table.hpp"
+#include "phyxel/physics/verlet.hpp"
+#include "rank_exchange.hpp"
+#include "solver/boundary_conditions.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr double share_of_range = 0.25;  // of the skin
+
+/// Sets where a phyxel's distance from other bodies is looked up, and the level of its surface,
+/// from the distances of places around it from its own body's surface.
+void look_around(SurfaceSite& site, const PlacedDistances& own) {
+  const double spacing = 0.45 * site.range;
+  const auto slope = [&](Vec3d way) {
+    return (own.gap(site.rest + spacing * way).distance -
+            own.gap(site.rest - spacing * way).distance) /
+           (2 * spacing);
+  };
+  const Vec3d normal{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})};
+  const double size = norm(normal);
+  if (!(size > 0.1)) return;                             // a body so thin that it has no inside
+  constexpr double share_of_spacing = 0.5, flat = 0.95;  // at an edge of a box, the size is 0.71
+  site.inward = (-share_of_spacing * spacing / size) * normal;
+  if (site.offset == 0 && size > flat) site.level = own.gap(site.rest).distance;
+}
+
+/// The box around two boxes.
+Box together(Box a, const Box& b) {
+  extend(a, b.low);
+  extend(a, b.high);
+  return a;
+}
+
+}  // namespace
+
+SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
+  if (!model.body_contact.acts()) return;
+  const std::vector<Vec3d> free = free_axes(model);
+  double least = HUGE_VAL;
+  for (std::size_t k = 0; k < phyxels().size(); ++k) {
+    const Index i = phyxels()[k], body = part_of(model, i).body;
+    const double range = model.neighbourhood.support[i];
+    SurfaceSite site{.rest = model.position[i],
+                     .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
+                     .area = model.volume[i] / range,
+                     .offset = model.body_contact.layer.offset[k],
+                     .range = range};
+    look_around(site, model.body_contact.distances[body].view());
+    sites_.push_back(site);
+    bodies_.push_back(body);
+    least = std::min(least, range);
+  }
+  groups_ = groups_of(model, model.body_contact.layer);
+  if (model.share) least = model.share->communicator->smallest(least);
+  skin_ = share_of_range * least;
+}
+
+std::vector<double> SurfaceLayer::gains(double dt) const {
+  std::vector<double> gains;
+  for (const Index i : phyxels()) {
+    gains.push_back(damped_flow(part_of(model_, i).material.damping, dt).gain / model_.mass[i]);
+  }
+  return gains;
+}
+
+std::vector<double> SurfaceLayer::regains(double dt) const {
+  std::vector<double> regains;
+  for (const Index i : phyxels()) {
+    regains.push_back(1 / damped_flow(part_of(model_, i).material.damping, dt).keep);
+  }
+  return regains;
+}
+
+std::vector<double> SurfaceLayer::wave_moduli() const {
+  std::vector<double> moduli;
+  for (const Index i : phyxels()) {
+    moduli.push_back(wave_stiffness_at_rest(part_of(model_, i).material));
+  }
+  return moduli;
+}
+
+Box SurfaceLayer::box_of(const LayerGroup& group, std::span<const Vec3d> position) const {
+  Box box = no_box;
+  for (std::size_t k = group.begin; k < group.end; ++k) {
+    box = together(box, grown({position[k], position[k]}, sites_[k].range));
+  }
+  return box;
+}
+
+BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes) const {
+  BodyReach reach{.boxes = std::vector(model_.body_contact.distances.size(), no_box),
+                  .partners = {}};
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    Box& box = reach.boxes[bodies_[groups_[g].begin]];
+    box = together(box, boxes[g]);
+  }
+  if (model_.share) {
+    const Communicator& ranks = *model_.share->communicator;
+    const std::vector<std::vector<Box>> all =
+        exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), reach.boxes));
+    for (const std::vector<Box>& some : all) {
+      for (std::size_t b = 0; b < some.size(); ++b) {
+        reach.boxes[b] = together(reach.boxes[b], some[b]);
+      }
+    }
+  }
+  std::vector<Box> with_skin;
+  for (const Box& box : reach.boxes) with_skin.push_back(grown(box, 0.5 * skin_));
+  reach.partners = partners_of_bodies(model_.body_contact, with_skin);
+  return reach;
+}
+
+}  // namespace phyxel

@@ -1,0 +1,66 @@
+/// The phyxels of surfaces by which bodies touch each other, and which bodies are near each other.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "model/box.hpp"
+#include "model/contact_groups.hpp"
+#include "phyxel/model.hpp"
+#include "phyxel/physics/body_contact.hpp"
+
+namespace phyxel {
+
+/// Where bodies are, as all ranks know it.
+struct BodyReach {
+  /// The box of the layer's phyxels of each body of the scene, grown by their ranges.
+  std::vector<Box> boxes;
+  /// The bodies within a skin of each body that it touches if they meet, ascending; with the body
+  /// itself if its parts touch each other.
+  std::vector<std::vector<Index>> partners;
+};
+
+/// The contact layer of a model's bodies.
+class SurfaceLayer {
+ public:
+  /// @param model must outlive this. Of a share: collective.
+  explicit SurfaceLayer(const Model& model);
+
+  const Model& model() const { return model_; }
+  /// The phyxels of the layer, ascending.
+  const std::vector<Index>& phyxels() const { return model_.body_contact.layer.phyxels; }
+  /// What does not change of each; its mobility is 1 along free axes and 0 along others.
+  const std::vector<SurfaceSite>& sites() const { return sites_; }
+  /// The body that each belongs to.
+  const std::vector<Index>& bodies() const { return bodies_; }
+  /// Groups of the layer, in its order.
+  const std::vector<LayerGroup>& groups() const { return groups_; }
+  /// Twice the distance by which phyxels may move before those that may touch have to be found
+  /// anew [m].
+  double skin() const { return skin_; }
+
+  /// The change of velocity of each by a force over a step of `dt` [s], along free axes [m/s/N].
+  std::vector<double> gains(double dt) const;
+  /// 1 over what the damping of a step of `dt` [s] keeps of the velocity of each.
+  std::vector<double> regains(double dt) const;
+  /// The modulus of pressure waves of each [Pa].
+  std::vector<double> wave_moduli() const;
+
+  /// The box of a group, grown by the ranges of its phyxels. @param position shape [phyxels] [m]
+  Box box_of(const LayerGroup& group, std::span<const Vec3d> position) const;
+  /// Where bodies are. Of a share: collective. @param boxes of the groups (`box_of`)
+  BodyReach reach_of(std::span<const Box> boxes) const;
+
+  std::size_t bytes() const {
+    return sites_.size() * sizeof(SurfaceSite) + bodies_.size() * sizeof(Index);
+  }
+
+ private:
+  const Model& model_;
+  std::vector<SurfaceSite> sites_;
+  std::vector<Index> bodies_;
+  std::vector<LayerGroup> groups_;
+  double skin_ = 0;
+};
+
+}  // namespace phyxel

@@ -1,0 +1,137 @@
+/// The search on the GPU for points that may touch, compared with that of the CPU.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <random>
+
+#include "model/assembly.hpp"
+#include "phyxel/solver.hpp"
+#include "setup/primitives.cuh"
+#include "setup/tiling.hpp"
+#include "solver/body_contacts.hpp"
+#include "solver/device_touching_points.hpp"
+#include "support/backend.hpp"
+#include "support/contact_scene.hpp"
+
+namespace phyxel::cuda {
+namespace {
+
+/// Blocks of two spacings in a heap, turned, some of them near each other.
+std::string heap(int bodies) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> place(-0.35, 0.35), angle(0, 360);
+  std::string text;
+  for (int b = 0; b < bodies; ++b) {
+    text += fmt::format(
+        "[[body]]\nname = 'b{}'\nshape = 'block'\nsize = [0.2, 0.15, 0.1]\nspacing = {}\n"
+        "rotation = [{:.3f}, {:.3f}, {:.3f}]\ntranslation = [{:.3f}, {:.3f}, {:.3f}]\n{}"
+        "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n",
+        b, b % 3 == 0 ? 0.02 : 0.035, angle(random), angle(random), angle(random), place(random),
+        place(random), place(random), b % 4 == 1 ? "damping = 3\n" : "");
+  }
+  return text;
+}
+
+template <class T>
+void expect_same(std::span<const T> host, const DeviceArray<T>& device, const char* what) {
+  const std::vector<T> values = fetched(device);
+  ASSERT_EQ(values.size(), host.size()) << what;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    // Only members are compared: they have no padding before their last one.
+    ASSERT_EQ(std::memcmp(&values[k], &host[k], sizeof(T)), 0) << what << ' ' << k;
+  }
+}
+template <class T>
+void expect_same(const std::vector<T>& host, const DeviceArray<T>& device, const char* what) {
+  expect_same(std::span<const T>(host), device, what);
+}
+
+class TouchingPointsOnDevice : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
+  const std::string contact = GetParam();
+  const Model model = build_model(parse_scene(end + contact + heap(12), "scene.toml"));
+  const SurfaceLayer layer(model);
+  const std::size_t phyxels = layer.phyxels().size();
+  TouchingPoints host(layer);
+  std::vector<Index> place;  // each phyxel's tile slot, in an order of its own
+  for (std::size_t k = 0; k < phyxels; ++k) {
+    place.push_back(static_cast<Index>(k % 7 * 1000 + phyxels - k / 7));
+  }
+  const Index tiles = static_cast<Index>(8000 + phyxels) / tile_size + 1;
+  DeviceTouchingPoints device(layer, place, tiles);
+
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> shift(-0.01, 0.01);
+  std::vector<Vec3d> position;
+  for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
+  std::size_t most = 0;
+  for (int search = 0; search < 3; ++search) {
+    const double dt = search < 2 ? 1e-4 : 2e-4;
+    host.find(position, dt);
+    device.find(sent(position, "test"), dt);
+    EXPECT_EQ(device.any(), host.any());
+    expect_same(host.own(), device.own().layer, "numbers in the layer");
+    expect_same(host.sites(), device.lists().site, "sites");
+    expect_same(host.ids(), device.lists().id, "ids");
+    expect_same(host.near().indices, device.lists().near, "entries");
+    expect_same(host.near().offsets, device.lists().near_start, "starts of rows");
+    expect_same(host.row_of_entry(), device.lists().row_of_entry, "rows of entries");
+    expect_same(host.entries_of().indices, device.lists().entries_of, "entries of points");
+    expect_same(host.entries_of().offsets, device.lists().entries_of_start, "their starts");
+    expect_same(host.rows_from().indices, device.lists().rows_from, "rows of points");
+    expect_same(host.rows_from().offsets, device.lists().rows_from_start, "their starts");
+    EXPECT_EQ(host.reach().partners, device.reach().partners);
+    const std::vector<ContactRow> rows = fetched(device.lists().rows);
+    ASSERT_EQ(rows.size(), host.rows().size());
+    for (std::size_t r = 0; r < rows.size(); ++r) {
+      const ContactRow& expected = host.rows()[r];
+      ASSERT_EQ(rows[r].point, expected.point);
+      ASSERT_EQ(rows[r].body, expected.body);
+      ASSERT_EQ(rows[r].law.static_friction, expected.law.static_friction);
+      ASSERT_EQ(rows[r].law.restitution, expected.law.restitution);
+      ASSERT_EQ(rows[r].apart, expected.apart);
+    }
+    const std::vector<Index> slots = fetched(device.own().place),
+                             entries = fetched(device.own().entry),
+                             used = fetched(device.own().tiles);
+    EXPECT_TRUE(std::is_sorted(used.begin(), used.end()));
+    for (std::size_t p = 0; p < slots.size(); ++p) {
+      ASSERT_EQ(slots[p], place[host.own()[p]]);
+      ASSERT_EQ(used[entries[p] / tile_size] * tile_size + entries[p] % tile_size, slots[p]);
+    }
+    most = std::max(most, rows.size());
+    for (Vec3d& x : position) x += {shift(random), shift(random), shift(random)};
+  }
+  EXPECT_GT(most, 500u);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, TouchingPointsOnDevice,
+    ::testing::Values("[contact]\nfriction = 0.3\n", "[contact]\nself = true\n",
+                      "[contact]\n[[contact.pair]]\nfirst = 'b0'\nsecond = 'b3'\nfriction = 0.5\n"
+                      "[[contact.pair]]\nfirst = 'b1'\nsecond = 'b2'\nrestitution = 0.5\n"));
+
+TEST(TouchingPointsOfDistantBodies, AreNone) {
+  const Model model = build_model(
+      parse_scene(end + "[contact]\n" +
+                      "[[body]]\nname = 'a'\nshape = 'block'\nsize = [1, 1, 1]\n"
+                      "spacing = 0.1\n" +
+                      material +
+                      "[[body]]\nname = 'b'\nshape = 'block'\nsize = [1, 1, 1]\nspacing = 0.1\n"
+                      "translation = [0, 0, 5]\n" +
+                      material,
+                  "scene.toml"));
+  const SurfaceLayer layer(model);
+  DeviceTouchingPoints device(layer, std::vector<Index>(layer.phyxels().size()), 1);
+  std::vector<Vec3d> position;
+  for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
+  device.find(sent(position, "test"), 1e-4);
+  EXPECT_FALSE(device.any());
+  EXPECT_EQ(device.own().layer.size(), 0u);
+  EXPECT_EQ(device.lists().rows.size(), 0u);
+}
+
+}  // namespace
+}  // namespace phyxel::cuda
