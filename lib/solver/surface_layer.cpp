@@ -11,6 +11,7 @@
 #include "phyxel/physics/verlet.hpp"
 #include "rank_exchange.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -95,6 +96,11 @@ Box SurfaceLayer::box_of(const LayerGroup& group, std::span<const Vec3d> positio
     box = together(box, grown({position[k], position[k]}, sites_[k].range));
   }
   return box;
+}
+
+BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position) const {
+  return reach_of(
+      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }));
 }
 
 BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes) const {

@@ -50,6 +50,8 @@ class SurfaceLayer {
   Box box_of(const LayerGroup& group, std::span<const Vec3d> position) const;
   /// Where bodies are. Of a share: collective. @param boxes of the groups (`box_of`)
   BodyReach reach_of(std::span<const Box> boxes) const;
+  /// The same from places [m], shape [phyxels].
+  BodyReach reach_at(std::span<const Vec3d> position) const;
 
   std::size_t bytes() const {
     return sites_.size() * sizeof(SurfaceSite) + bodies_.size() * sizeof(Index);

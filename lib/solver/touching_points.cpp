@@ -48,9 +48,7 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
 
 void TouchingPoints::find(std::span<const Vec3d> position, double dt) {
   const Phase phase("points that may touch");
-  std::vector<Box> boxes;
-  for (const LayerGroup& group : layer_.groups()) boxes.push_back(layer_.box_of(group, position));
-  reach_ = layer_.reach_of(boxes);
+  reach_ = layer_.reach_at(position);
   const std::vector<ContactCandidate> all = candidates(position, dt);
   ContactRows found = find_rows(model_.body_contact, all, skin());
   any_ = !found.rows.empty();

@@ -109,9 +109,10 @@ TEST(Copies, ActAsBodiesWithFieldsOfTheirOwn) {
 /// Where a watch is told that the phyxels of bodies are.
 struct Watched {
   Model model;
-  LayerWatch watch{model, 1};
+  SurfaceLayer layer{model};
+  LayerWatch watch{layer, 1};
+  double skin = layer.skin();
   std::vector<Vec3d> way, velocity;  // of each body
-  double skin = 0.01;
 
   explicit Watched(const std::vector<Vec3d>& places) : model(model_of(places)) {
     way.resize(places.size());
@@ -134,7 +135,7 @@ struct Watched {
     for (const Index i : model.body_contact.layer.phyxels) {
       position.push_back(model.position[i] + state_of(i).displacement);
     }
-    watch.found(std::move(position), skin);
+    watch.found(position, layer.reach_at(position));
     return true;
   }
 };
