@@ -7,7 +7,6 @@
 
 #include "model/assembly.hpp"
 #include "phyxel/solver.hpp"
-#include "setup/primitives.cuh"
 #include "setup/tiling.hpp"
 #include "solver/body_contacts.hpp"
 #include "solver/device_touching_points.hpp"
@@ -17,20 +16,31 @@
 namespace phyxel::cuda {
 namespace {
 
-/// Blocks of two spacings in a heap, turned, some of them near each other.
-std::string heap(int bodies) {
-  std::mt19937 random(7);
-  std::uniform_real_distribution<double> place(-0.35, 0.35), angle(0, 360);
+/// Blocks of two spacings in a pile, beside each other.
+std::string pile() {
   std::string text;
-  for (int b = 0; b < bodies; ++b) {
+  for (int b = 0; b < 12; ++b) {
     text += fmt::format(
         "[[body]]\nname = 'b{}'\nshape = 'block'\nsize = [0.2, 0.15, 0.1]\nspacing = {}\n"
-        "rotation = [{:.3f}, {:.3f}, {:.3f}]\ntranslation = [{:.3f}, {:.3f}, {:.3f}]\n{}"
-        "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n",
-        b, b % 3 == 0 ? 0.02 : 0.035, angle(random), angle(random), angle(random), place(random),
-        place(random), place(random), b % 4 == 1 ? "damping = 3\n" : "");
+        "translation = [{:.3f}, {:.3f}, {:.3f}]\n"
+        "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n{}",
+        b, b % 3 == 0 ? 0.02 : 0.035, b % 2 * 0.205 + b / 4 * 0.03, b / 2 % 2 * 0.152,
+        b / 4 * 0.101, b % 4 == 1 ? "damping = 3\n" : "");
   }
   return text;
+}
+
+template <class T>
+std::vector<T> fetched(const DeviceArray<T>& array) {
+  std::vector<T> values(array.size());
+  array.download(values.data());
+  return values;
+}
+
+DeviceArray<Vec3d> sent(const std::vector<Vec3d>& values) {
+  DeviceArray<Vec3d> array(values.size(), "places");
+  array.upload(values.data());
+  return array;
 }
 
 template <class T>
@@ -51,7 +61,7 @@ class TouchingPointsOnDevice : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
   const std::string contact = GetParam();
-  const Model model = build_model(parse_scene(end + contact + heap(12), "scene.toml"));
+  const Model model = build_model(parse_scene(end + contact + pile(), "scene.toml"));
   const SurfaceLayer layer(model);
   const std::size_t phyxels = layer.phyxels().size();
   TouchingPoints host(layer);
@@ -63,14 +73,14 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
   DeviceTouchingPoints device(layer, place, tiles);
 
   std::mt19937 random(3);
-  std::uniform_real_distribution<double> shift(-0.01, 0.01);
+  std::uniform_real_distribution<double> shift(-0.005, 0.005);
   std::vector<Vec3d> position;
   for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
   std::size_t most = 0;
   for (int search = 0; search < 3; ++search) {
     const double dt = search < 2 ? 1e-4 : 2e-4;
     host.find(position, dt);
-    device.find(sent(position, "test"), dt);
+    device.find(sent(position), dt);
     EXPECT_EQ(device.any(), host.any());
     expect_same(host.own(), device.own().layer, "numbers in the layer");
     expect_same(host.sites(), device.lists().site, "sites");
@@ -104,14 +114,14 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
     most = std::max(most, rows.size());
     for (Vec3d& x : position) x += {shift(random), shift(random), shift(random)};
   }
-  EXPECT_GT(most, 500u);
+  EXPECT_GT(most, 200u);
 }
 
 INSTANTIATE_TEST_SUITE_P(
     All, TouchingPointsOnDevice,
     ::testing::Values("[contact]\nfriction = 0.3\n", "[contact]\nself = true\n",
-                      "[contact]\n[[contact.pair]]\nfirst = 'b0'\nsecond = 'b3'\nfriction = 0.5\n"
-                      "[[contact.pair]]\nfirst = 'b1'\nsecond = 'b2'\nrestitution = 0.5\n"));
+                      "[contact]\n[[contact.pair]]\nfirst = 'b0'\nsecond = 'b1'\nfriction = 0.5\n"
+                      "[[contact.pair]]\nfirst = 'b4'\nsecond = 'b0'\nrestitution = 0.5\n"));
 
 TEST(TouchingPointsOfDistantBodies, AreNone) {
   const Model model = build_model(
@@ -127,7 +137,7 @@ TEST(TouchingPointsOfDistantBodies, AreNone) {
   DeviceTouchingPoints device(layer, std::vector<Index>(layer.phyxels().size()), 1);
   std::vector<Vec3d> position;
   for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
-  device.find(sent(position, "test"), 1e-4);
+  device.find(sent(position), 1e-4);
   EXPECT_FALSE(device.any());
   EXPECT_EQ(device.own().layer.size(), 0u);
   EXPECT_EQ(device.lists().rows.size(), 0u);
