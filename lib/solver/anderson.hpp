@@ -17,9 +17,10 @@ class AndersonMixing {
 
   /// Returns the next x.
   /// @param x,f the present x and f(x), of the same size at each call since `forget`
+  /// @param share of f that is taken: less than 1 for an f that changes by more than x does
   /// @param product returns the inner product of two such vectors; collective if it is
   template <class Product>
-  std::vector<double> next(const std::vector<double>& x, const std::vector<double>& f,
+  std::vector<double> next(const std::vector<double>& x, const std::vector<double>& f, double share,
                            Product&& product) {
     history_.push_front({x, f});
     if (history_.size() > most + 1) history_.pop_back();
@@ -38,15 +39,15 @@ class AndersonMixing {
       }
     }
     std::vector<double> next(x.size());
-    for (std::size_t i = 0; i < x.size(); ++i) next[i] = x[i] + f[i];
+    for (std::size_t i = 0; i < x.size(); ++i) next[i] = x[i] + share * f[i];
     if (count == 0 || !(matrix.trace() > 0)) return next;
     // Changes that depend on each other count once.
     Eigen::CompleteOrthogonalDecomposition<Eigen::MatrixXd> solver;
     solver.setThreshold(1e-12).compute(matrix);
-    const Eigen::VectorXd share = solver.solve(right);
+    const Eigen::VectorXd weight = solver.solve(right);
     for (Eigen::Index k = 0; k < count; ++k) {
       for (std::size_t i = 0; i < x.size(); ++i) {
-        next[i] -= share[k] * (change[k].x[i] + change[k].f[i]);
+        next[i] -= weight[k] * (change[k].x[i] + share * change[k].f[i]);
       }
     }
     return next;

@@ -32,12 +32,13 @@ void BodyPenalty::find_rubbing(SlipMeasure measure) {
     for (std::size_t p = 0; p < ahead.size(); ++p) ahead[p] = ahead[p] - slip_from_[p];
   }
   rubbing_.assign(touches_.size(), {});
+  record_.begin_linearise();
   const double reach = record_.reach(measure);
   for (std::size_t r = 0; r < rubbing_.size(); ++r) {
     const ContactRow& row = points_.rows()[r];
-    const bool touches =
-        touches_[r].is_inside && gap_[r] < reach * points_.sites()[row.point].range;
-    if (!touches || !(row.law.static_friction > 0)) continue;
+    const bool touches = gap_[r] < reach * points_.sites()[row.point].range;
+    if (!touches_[r].is_inside || !record_.rubs(key(r), touches) || !(row.law.static_friction > 0))
+      continue;
     rubbing_[r].normal = touches_[r].normal;
     rubbing_[r].slip = slip(r, moved);
     record_.set_friction(key(r), row.law, push_at(r, gap_[r]), stiffness_[r], measure,
@@ -49,8 +50,8 @@ void BodyPenalty::find_rubbing(SlipMeasure measure) {
 void BodyPenalty::mix_friction() {
   for (std::size_t r = 0; r < rubbing_.size(); ++r) {
     if (!rubbing_[r].acts()) continue;
-    rubbing_[r].set_limit(record_.friction(key(r), points_.rows()[r].law), push_at(r, gap_[r]),
-                          stiffness_[r], slip_share_);
+    rubbing_[r].set_limit(record_.friction(key(r), points_.rows()[r].law),
+                          record_.counted(key(r), push_at(r, gap_[r])), stiffness_[r], slip_share_);
   }
 }
 
@@ -71,7 +72,7 @@ void BodyPenalty::for_each_friction(const Vector& u, Each&& each) const {
   for (std::size_t r = 0; r < rubbing_.size(); ++r) {
     const RubbingContact& contact = rubbing_[r];
     if (!contact.acts()) continue;
-    each(r, friction_penalty(contact.limit, contact.normal, slip(r, moved), contact.is_careful));
+    each(r, friction_penalty(contact.limit, contact.normal, slip(r, moved), contact.way));
   }
 }
 

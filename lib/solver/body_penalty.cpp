@@ -71,8 +71,7 @@ void BodyPenalty::find_touches() {
     moved = std::max(moved, norm(motion_[p].after - shaped_at_[p]) / points_.sites()[p].range);
   }
   if (model_.share) moved = model_.share->communicator->largest(moved);
-  constexpr double far = 0.01;
-  if (moved <= far) {
+  if (moved <= far_) {
     for (std::size_t r = 0; r < touches.size(); ++r) {
       if (touches[r].normal != Vec3d{}) {
         touches_[r].gap = touches[r].gap;
@@ -82,6 +81,7 @@ void BodyPenalty::find_touches() {
     }
     return;
   }
+  if (knows_shapes_) far_ *= 1.2;
   touches_ = std::move(touches);
   carries_ = std::move(carries);
   knows_shapes_ = true;
@@ -99,6 +99,7 @@ void BodyPenalty::linearise(const Vector& u, const SlipMeasure& slip,
   if (knows_expected_) expected_ = gaps(u);
   find_points(u);
   const std::size_t points = points_.sites().size(), rows = points_.rows().size();
+  held_reach_ = slip.rests && renewals_++ < 6 ? rounding_reach : 0;
   motion_.assign(points, {});
   for (std::size_t p = 0; p < count(); ++p) {
     const Index i = phyxel(p);
@@ -106,7 +107,7 @@ void BodyPenalty::linearise(const Vector& u, const SlipMeasure& slip,
     set_gradient(motion_[p], points_.sites()[p], gradient[i]);
   }
   points_.refresh(motion_);
-  start_ = of_points(u);
+  start_ = renewed_at_ = of_points(u);
   find_touches();
   stiffness_.assign(rows, 0);
   for (std::size_t r = 0; r < rows; ++r) {
@@ -125,7 +126,24 @@ void BodyPenalty::linearise(const Vector& u, const SlipMeasure& slip,
   find_blocks();
 }
 
-bool BodyPenalty::mix(const Vector& u) {
+void BodyPenalty::move_to(const Vector& u, const SlipMeasure& slip) {
+  if (empty()) return;
+  gap_ = gaps(u);
+  start_ = of_points(u);
+  if (rubs_) find_rubbing(slip);
+  find_blocks();
+}
+
+double BodyPenalty::way_to(const Vector& u) const {
+  double farthest = 0;
+  for (std::size_t p = 0; p < count(); ++p) {
+    const double way = norm(u[phyxel(p)] - renewed_at_[p]);
+    farthest = std::max(farthest, way / (far_ * points_.sites()[p].range));
+  }
+  return farthest;
+}
+
+bool BodyPenalty::mix(const Vector& u, double share) {
   if (empty() || !knows_expected_) return false;
   // The unknowns are what the gaps would be without displacements.
   const std::vector<Vec3d> moved = of_points(u);
@@ -144,7 +162,7 @@ bool BodyPenalty::mix(const Vector& u) {
     if (model_.share) add_over_ranks(*model_.share->communicator, {&sum});
     return sum.value();
   };
-  const std::vector<double> next = mixing_.next(x, f, product);
+  const std::vector<double> next = mixing_.next(x, f, share, product);
   for (std::size_t r = 0; r < gap_.size(); ++r) {
     if (touches_[r].is_inside) gap_[r] = next[r] + way[r];
   }
@@ -248,7 +266,7 @@ void BodyPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
 
 bool BodyPenalty::is_held(std::size_t r) const {
   const double range = points_.sites()[points_.rows()[r].point].range;
-  return touches_[r].is_inside && gap_[r] < rounding_reach * range;
+  return touches_[r].is_inside && gap_[r] < held_reach_ * range;
 }
 
 void BodyPenalty::find_blocks() {

@@ -34,20 +34,32 @@ class BodyPenalty {
   /// @param u displacements [m]. @param slip what slip is; not used without friction
   /// @param gradient of displacement, shape [n, 3, 3]
   void linearise(const Vector& u, const SlipMeasure& slip, const std::vector<Mat3d>& gradient);
+  /// Moves what `linearise` has found to displacements u, with gaps by their linear form.
+  void move_to(const Vector& u, const SlipMeasure& slip);
+  /// The farthest way of a point from its place at `linearise` to displacements u, as a share of
+  /// the largest one up to which normals are kept. Of this rank's points.
+  double way_to(const Vector& u) const;
   /// Begins a search anew: points, normals and gaps of earlier searches have no influence on it, so
   /// that a restart gives the same bits.
   void forget() {
     knows_points_ = false;
+    far_ = 0.01;
+    renewals_ = 0;
     record_.forget();
   }
+  /// As of `RubbingRecord`, and sets friction anew.
+  void renew_normals(double share) {
+    record_.renew(share);
+    mix_friction();
+  }
+  std::pair<double, double> unrest() const { return record_.unrest(); }
   /// As of `ContactPenalty`.
   bool begin_sliding();
-  void be_careful(bool careful) { record_.be_careful(careful); }
   /// Replaces the gaps at u, the displacements of `linearise`, by those from which the next step of
   /// Newton's method is most likely to lead to a place where gaps are what it takes them for: they
   /// depend on deformation in ways that the stiffness does not know.
   /// @returns true if that changes forces
-  bool mix(const Vector& u);
+  bool mix(const Vector& u, double share);
   /// Adds the forces at displacements u [N].
   void add(const Vector& u, Vector& force) const;
   /// Adds the energies of this rank's points at displacements u [J].
@@ -104,7 +116,8 @@ class BodyPenalty {
   std::vector<Vec3d> spread(const std::vector<double>& push) const;
   RubbingRecord::Key key(std::size_t r) const {
     const ContactRow& row = points_.rows()[r];
-    return {points_.ids()[row.point], row.body};
+    const auto bodies = static_cast<Index>(fields_.size());
+    return {points_.ids()[row.point], row.patch * bodies + row.body};
   }
   /// Finds the slips at `linearise`, and friction by the present gaps.
   void find_rubbing(SlipMeasure measure);
@@ -134,7 +147,8 @@ class BodyPenalty {
   std::vector<double> modulus_;          // of pressure waves, of each point [Pa]
   std::vector<Vec3d> found_at_;          // places of the layer when points were found [m]
   std::vector<Vec3d> shaped_at_;         // places of own points when normals were found [m]
-  std::vector<Vec3d> start_;             // displacements of the points at `linearise` [m]
+  std::vector<Vec3d> start_;             // displacements of the points to which gaps belong [m]
+  std::vector<Vec3d> renewed_at_;        // those at `linearise` [m]
   std::vector<SurfaceMotion> motion_;    // shape [points]
   std::vector<SurfaceTouch> touches_;    // shape [rows], as all others of rows
   std::vector<SurfaceShare> carries_;    // shape [entries]
@@ -150,6 +164,11 @@ class BodyPenalty {
   std::vector<Vec3d> shape_place_;       // places of all points when normals were found [m]
   std::vector<Vec3d> slip_from_;         // displacements of all points as the stage starts [m]
   std::vector<RubbingContact> rubbing_;  // shape [rows]
+  int renewals_ = 0;                     // in the search
+  double held_reach_ = 0;                // gap of points with stiffness, as a share of ranges
+  /// The way as a share of ranges from which on normals are found anew. They jump where a point
+  /// passes an edge: it grows in a search, so that it comes to an end.
+  double far_ = 0.01;
   // Whether points, normals and expected gaps belong to this search; the same on all ranks.
   bool knows_points_ = false, knows_shapes_ = false, knows_expected_ = false;
 };

@@ -11,6 +11,7 @@ namespace phyxel {
 struct ContactRow {
   Index point = 0;  ///< Number of the point.
   Index body = 0;   ///< The body that it may enter.
+  Index patch = 0;  ///< Number of the part of that body's surface among those near the point.
   ContactLaw law;
   double apart = 0;  ///< As of `surface_touch` [m].
 };

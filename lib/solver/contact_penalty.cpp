@@ -71,6 +71,8 @@ void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, 
 void ContactPenalty::find_rubbing(const PlacedObstacles& at, const Vector& u,
                                   const SlipMeasure& slip) {
   rubbing_.clear();
+  record_.begin_linearise();
+  slip_share_ = slip.share;
   const PlacedLayer layer(model_, groups_, [&](Index i) { return u[i]; });
   const double reach = record_.reach(slip);
   for (std::size_t o = 0; o < model_.obstacles.size(); ++o) {
@@ -82,6 +84,7 @@ void ContactPenalty::find_rubbing(const PlacedObstacles& at, const Vector& u,
       Rubbing found;
       found.phyxel = k;
       found.obstacle = o;
+      if (!record_.rubs(found.key(), true)) return;
       found.normal = gap.normal;
       found.surface = slip.from[i] + at[o].dt * surface_velocity(at[o], x);
       found.slip = along(gap.normal, u[i] - found.surface);
@@ -98,7 +101,33 @@ void ContactPenalty::find_rubbing(const PlacedObstacles& at, const Vector& u,
 
 PenaltyForce ContactPenalty::friction_of(const Rubbing& rubbing, const Vector& u) const {
   const Vec3d way = u[model_.contact.phyxels[rubbing.phyxel]] - rubbing.surface;
-  return friction_penalty(rubbing.limit, rubbing.normal, along(rubbing.normal, way), false);
+  return friction_penalty(rubbing.limit, rubbing.normal, along(rubbing.normal, way), rubbing.way);
+}
+
+bool ContactPenalty::may_keep(const Vector& u) const {
+  const double way = bodies_.empty() ? 0 : bodies_.way_to(u);
+  return (model_.share ? model_.share->communicator->largest(way) : way) <= 1;
+}
+
+void ContactPenalty::renew_normals(double share) {
+  record_.renew(share);
+  for (Rubbing& rubbing : rubbing_) {
+    const ContactLaw& law = model_.obstacles[rubbing.obstacle].law;
+    rubbing.set_limit(record_.friction(rubbing.key(), law), record_.held(rubbing.key()),
+                      stiffness_[rubbing.phyxel], slip_share_);
+  }
+  bodies_.renew_normals(share);
+}
+
+double ContactPenalty::unrest() const {
+  const auto [change, most] = record_.unrest();
+  const auto [change_of_bodies, most_of_bodies] = bodies_.unrest();
+  double all_change = std::max(change, change_of_bodies), all_most = std::max(most, most_of_bodies);
+  if (model_.share) {
+    all_change = model_.share->communicator->largest(all_change);
+    all_most = model_.share->communicator->largest(all_most);
+  }
+  return all_change > 0 ? all_change / all_most : 0;
 }
 
 bool ContactPenalty::begin_sliding() {
@@ -113,6 +142,7 @@ bool ContactPenalty::begin_sliding() {
 }
 
 void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u, const SlipMeasure& slip,
+                               Renewal renewal,
                                const std::function<std::vector<Mat3d>()>& gradient_of_u) {
   std::fill(blocks_.begin(), blocks_.end(), Mat3d{});
   normal_forces_ = 0;
@@ -122,7 +152,11 @@ void ContactPenalty::linearise(const PlacedObstacles& at, const Vector& u, const
   });
   if (obstacles_rub_) find_rubbing(at, u, slip);
   for (const Rubbing& rubbing : rubbing_) blocks_[rubbing.phyxel] += rubbing.stiffness;
-  if (!bodies_.empty()) bodies_.linearise(u, slip, gradient_of_u());
+  if (renewal == Renewal::motion) {
+    bodies_.move_to(u, slip);
+  } else if (!bodies_.empty()) {
+    bodies_.linearise(u, slip, gradient_of_u());
+  }
   held_.clear();
   for (std::size_t k = 0; k < blocks_.size(); ++k) {
     const Mat3d& block = blocks_[k];

@@ -46,27 +46,32 @@ class ContactPenalty {
   bool empty() const { return model_.obstacles.empty() && bodies_.empty(); }
   /// True if something has friction.
   bool rubs() const { return obstacles_rub_ || bodies_.rubs(); }
+  /// True if contact has what a search may keep over some steps (`Renewal`).
+  bool can_keep() const { return rubs() || !bodies_.empty(); }
+  /// True if what was found at the last renewal of all may be kept at displacements u. Collective
+  /// on a share.
+  bool may_keep(const Vector& u) const;
+  /// True if friction is that of normal forces that are held.
+  bool holds_normals() const { return record_.holds(); }
+  /// As of `RubbingRecord`, and sets friction anew.
+  void renew_normals(double share);
+  /// The largest change of normal forces since they are held, as a share of the largest one [1].
+  /// Collective on a share.
+  double unrest() const;
   /// Finds the stiffness at displacements u, and how bodies touch there; it stays so until the next
-  /// call. Friction counts as that of the normal forces at u. Collective on a share.
+  /// call. Collective on a share.
   /// @param slip what slip is; not used without friction. @param gradient_of_u returns the
-  /// gradients of displacement, for bodies that touch each other
+  /// gradients of displacement, for bodies that touch each other, where all is renewed
   void linearise(const PlacedObstacles& at, const Vector& u, const SlipMeasure& slip,
-                 const std::function<std::vector<Mat3d>()>& gradient_of_u);
+                 Renewal renewal, const std::function<std::vector<Mat3d>()>& gradient_of_u);
   /// Begins a search anew, on which earlier searches have no influence.
   void forget();
   /// Gives the points that slide at the displacements of the last `linearise` the kinetic friction,
   /// which counts from the next one on. Collective on a share. @returns true if that changes forces
   bool begin_sliding();
-  /// From the next `linearise` on, slips of searches for rest lead to small steps or, near the end
-  /// of a search, to those of Newton's method: before normal forces are known well, friction may
-  /// seem not to hold what it holds.
-  void be_careful(bool careful) {
-    record_.be_careful(careful);
-    bodies_.be_careful(careful);
-  }
   /// Replaces the gaps between bodies at u, the displacements of the last `linearise`, by better
   /// ones to start a step of Newton's method from. @returns true if that changes forces
-  bool mix(const Vector& u) { return bodies_.mix(u); }
+  bool mix(const Vector& u, double share) { return bodies_.mix(u, share); }
   /// Adds the forces at displacements u [N]. Collective on a share, as all that follow.
   void add(const PlacedObstacles& at, const Vector& u, Vector& force) const;
   /// The energy at displacements u [J].
@@ -117,6 +122,7 @@ class ContactPenalty {
   bool obstacles_rub_ = false, have_two_frictions_ = false;
   std::vector<Rubbing> rubbing_;  // by obstacle, then by phyxel
   RubbingRecord record_;
+  double slip_share_ = 0;  // as of `SlipMeasure`
   BodyPenalty bodies_;
   std::map<Index, Mat3d> held_;  // stiffness of phyxels in contact against themselves [N/m]
 };

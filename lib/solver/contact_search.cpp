@@ -12,6 +12,11 @@
 namespace phyxel {
 namespace {
 
+/// A phyxel near a point, and the patch of its body's surface that it is in.
+struct InPatch {
+  Index phyxel = 0, patch = 0;
+};
+
 /// The phyxels near a point, of bodies that it may touch.
 class Neighbours {
  public:
@@ -37,6 +42,25 @@ class Neighbours {
              std::tuple(points_[b].body, part_of_list(points_[b]), b);
     });
     return found;
+  }
+
+  /// The same by bodies, then by patches, then as `of`.
+  std::vector<InPatch> in_patches(std::size_t p) const {
+    std::vector<InPatch> all;
+    for (const Index k : of(p)) all.push_back({k, 0});
+    for (auto begin = all.begin(); begin != all.end();) {
+      const auto body = points_[begin->phyxel].body;
+      const auto end = std::find_if(
+          begin, all.end(), [&](const InPatch& k) { return points_[k.phyxel].body != body; });
+      find_patches(
+          static_cast<Index>(end - begin),
+          [&](Index k) -> const SurfaceSite& { return points_[begin[k].phyxel].site; },
+          [&](Index k) -> Index& { return begin[k].patch; });
+      std::stable_sort(begin, end,
+                       [](const InPatch& a, const InPatch& b) { return a.patch < b.patch; });
+      begin = end;
+    }
+    return all;
   }
 
  private:
@@ -86,16 +110,16 @@ ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandida
   std::vector<std::pair<Index, Index>> entries;
   if (points.empty()) return found;
   const Neighbours neighbours(contact, points, skin);
-  const std::vector<std::vector<Index>> near =
-      tabulated(points.size(), [&](std::size_t p) { return neighbours.of(p); });
+  const std::vector<std::vector<InPatch>> near =
+      tabulated(points.size(), [&](std::size_t p) { return neighbours.in_patches(p); });
   for (std::size_t p = 0; p < points.size(); ++p) {
-    for (const Index k : near[p]) {
+    for (const auto& [k, patch] : near[p]) {
       const Index body = points[k].body;
       const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
-                          found.rows.back().body != body;
+                          found.rows.back().body != body || found.rows.back().patch != patch;
       if (is_new) {
-        found.rows.push_back(
-            row_of(points[p], static_cast<Index>(p), body, *contact.law_of(points[p].body, body)));
+        found.rows.push_back(row_of(points[p], static_cast<Index>(p), body, patch,
+                                    *contact.law_of(points[p].body, body)));
       }
       entries.emplace_back(
           contact_threads * static_cast<Index>(found.rows.size() - 1) + part_of_list(points[k]), k);

@@ -58,7 +58,7 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
     // Where the search for rest is not known any more, friction is none.
     slip = slip_of_stage(rests ? 0 : stage, state.displacement, state.velocity);
   }
-  penalty.linearise(at, state.displacement, slip, [&] {
+  penalty.linearise(at, state.displacement, slip, Renewal::all, [&] {
     std::vector<Mat3d> gradient;
     backend.displacement_gradients(gradient);
     return gradient;

@@ -175,10 +175,12 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     set_targets(model, static_cast<double>(stage) / stages, balance);
     balance.obstacles = obstacles_after(model, static_cast<double>(stage) / stages,
                                         static_cast<double>(stage - 1) / stages);
+    balance.slip.rests = true;
     if (newton.contact().rubs()) {
       // A search that goes on in its first stage counts slips from rest, as it has begun.
       balance.slip = {.from = stage == 1 ? vectors.make() : found.state.displacement,
-                      .share = share_of_depth};
+                      .share = share_of_depth,
+                      .rests = true};
     }
     const bool last = stage == stages;
     const double tolerance = last ? options.tolerance : std::max(options.tolerance, on_the_way);

@@ -12,7 +12,7 @@ namespace {
 
 // Tolerance of residual forces, whose effect on velocities is far below the error of the step.
 constexpr double tolerance = 1e-8;
-constexpr int most_newton_steps = 100;
+constexpr int most_newton_steps = 400;
 const double share_of_step = 1 - std::sqrt(0.5);  // γ
 constexpr double share_of_depth = 1e-3;           // of `SlipMeasure`
 

@@ -19,10 +19,19 @@ constexpr double inner_tolerance = 1e-3;
 constexpr int most_inner = 50'000;
 // Limit of conjugate gradient iterations per unknown; in exact arithmetic one per unknown suffices.
 constexpr int most_inner_share = 10;
-constexpr double careful_above = 1e-3;   // residual (`ContactPenalty::be_careful`)
 constexpr int most_exhausted = 3;        // steps in a row whose linear equations stay unsolved
 constexpr int most_without_gain = 50;    // steps that hardly reduce the smallest residual
 constexpr double rounding_share = 1e-6;  // times the tolerance: a few units of rounding
+
+// What is kept of contact from step to step (`Renewal`).
+constexpr double kept_below = 1e-2;       // residual
+constexpr int most_kept = 5;              // steps
+constexpr double share_of_goal = 0.1;     // of the last residual, from which on contact is renewed
+constexpr double held_below = 1e-3;       // residual, for the normal forces of friction
+constexpr int most_unheld = 15;           // steps until they are held, with inertia
+constexpr int most_unsettled = 8;         // renewals without a gain until contact changes by less
+constexpr double unrest_at_rest = 1e-9;   // change of normal forces in a balance, over the largest
+constexpr double unrest_in_steps = 1e-3;  // likewise: below the error of a step
 
 Vec3d held_part(const Balance& balance, Index i, Vec3d v) {
   return v - by_components(balance.free[i], v);
@@ -50,10 +59,10 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
 /// linear equations stayed unsolved
 std::string Newton::why_to_end(const NewtonReport& report, int without_gain, int exhausted) const {
   if (!std::isfinite(report.residual)) return "forces are not finite";
-  if (report.steps == most_steps_) {
+  if (report.steps >= most_steps_) {
     return fmt::format("{} steps are all that is allowed", most_steps_);
   }
-  if (without_gain == most_without_gain) {
+  if (without_gain >= most_without_gain) {
     return fmt::format("{} steps in a row have gained nothing", without_gain);
   }
   if (exhausted < most_exhausted) return {};
@@ -63,34 +72,88 @@ std::string Newton::why_to_end(const NewtonReport& report, int without_gain, int
       exhausted, most_inner_here());
 }
 
+/// Holds the normal forces of friction once they are known well, or where they do not settle: with
+/// them friction has an energy, and the search finds a balance. Without inertia nothing but
+/// friction may hold a body, so that they have to be known well first.
+void Newton::hold_normals(const Balance& balance, Rounds& rounds, const NewtonReport& report) {
+  if (!contact_.rubs() || contact_.holds_normals()) return;
+  const bool is_near = report.residual <= held_below;
+  const bool holds = balance.weight.empty() ? is_near && rounds.without_gain >= most_unsettled
+                                            : is_near || report.steps >= most_unheld;
+  if (!holds) return;
+  contact_.renew_normals(1);
+  rounds.forget_gain();
+}
+
+/// Renews the normal forces of friction where a balance with held ones is found.
+/// @returns false if it is a balance with those that it leads to
+bool Newton::renew_normals(const Balance& balance, Rounds& rounds) {
+  const double most = balance.weight.empty() ? unrest_at_rest : unrest_in_steps;
+  if (!contact_.holds_normals() || contact_.unrest() <= most) return false;
+  // Where they swing, smaller changes settle.
+  ++rounds.of_normals;
+  contact_.renew_normals(rounds.of_normals < 4 ? 1 : rounds.of_normals < 10 ? 0.5 : 0.25);
+  return true;
+}
+
+/// Takes stock where all of contact is found anew. @returns true if the search has ended
+bool Newton::takes_stock(const Balance& balance, const Vector& u, const Vector& force,
+                         double tolerance, bool is_placed, Vector& all, Rounds& rounds,
+                         NewtonReport& report) {
+  report.residual = residual(balance, u, all);
+  report.evaluations = evaluations_;
+  report.found = report.residual <= tolerance && is_placed;
+  if (report.found) {
+    const bool begins = contact_.begin_sliding();
+    if (!begins && !renew_normals(balance, rounds)) return true;
+    if (!begins) all = with_contact(balance, u, force);
+    rounds.smallest = std::numeric_limits<double>::infinity();
+  }
+  rounds.renewed = residual(balance, u, all);
+  const bool gained = !is_placed || rounds.renewed < 0.9 * rounds.smallest;
+  rounds.smallest = std::min(rounds.smallest, rounds.renewed);
+  rounds.without_gain = gained ? 0 : rounds.without_gain + 1;
+  report.why = why_to_end(report, rounds.without_gain, rounds.exhausted);
+  if (!report.why.empty()) return true;
+  hold_normals(balance, rounds, report);
+  rounds.kept = 0;
+  return false;
+}
+
+/// True if contact has to be found anew after steps that have kept it.
+bool Newton::must_renew(const Rounds& rounds, const Balance& balance, const Vector& u,
+                        const Vector& all, double tolerance) const {
+  const double goal = std::max(0.5 * tolerance, share_of_goal * rounds.renewed);
+  return rounds.renewed > kept_below || rounds.kept >= most_kept || !contact_.may_keep(u) ||
+         residual(balance, u, all) <= goal;
+}
+
 NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) {
   NewtonReport report;
   evaluations_ = 0;
   progress_ = {.tolerance = tolerance};
-  double smallest = std::numeric_limits<double>::infinity();
-  int without_gain = 0, exhausted = 0;
+  Rounds rounds;
   find_stiffness(balance);
   contact_.forget();
   // Forces and energies without contact, whose stiffness is known and needs no differences.
   Vector force = forces_without_contact(balance, u), step = vectors_.make(), next = vectors_.make();
   double plain_energy = potential(balance, u);
   for (;;) {
-    linearise_contact(balance, u);
+    linearise_contact(balance, u, rounds.renewal);
     Vector all = with_contact(balance, u, force);
-    report.residual = residual(balance, u, all);
-    report.evaluations = evaluations_;
-    contact_.be_careful(report.residual > careful_above);
     const double to_move = vectors_.largest(
         [&](Index i) { return norm(held_part(balance, i, balance.target[i] - u[i])); });
-    report.found = report.residual <= tolerance && to_move == 0;
-    if (report.found && !contact_.begin_sliding()) return report;
-    if (report.found) smallest = std::numeric_limits<double>::infinity();
-    const bool gained = to_move > 0 || report.residual < 0.9 * smallest;
-    smallest = std::min(smallest, report.residual);
-    without_gain = gained ? 0 : without_gain + 1;
-    report.why = why_to_end(report, without_gain, exhausted);
-    if (!report.why.empty()) return report;
-    if (contact_.mix(u)) all = with_contact(balance, u, force);
+    if (rounds.renewal == Renewal::motion) {
+      if (to_move > 0 || must_renew(rounds, balance, u, all, tolerance)) {
+        rounds.renewal = Renewal::all;
+        continue;
+      }
+    } else {
+      const bool is_placed = to_move == 0;
+      if (takes_stock(balance, u, force, tolerance, is_placed, all, rounds, report)) return report;
+      const double share = rounds.without_gain < most_unsettled ? 1 : 0.3;
+      if (contact_.mix(u, share)) all = with_contact(balance, u, force);
+    }
     const double energy = plain_energy + contact_.energy(balance.obstacles, u);
     progress_.step = report.steps;
     progress_.residual = report.residual;
@@ -100,47 +163,62 @@ NewtonReport Newton::solve(const Balance& balance, double tolerance, Vector& u) 
       return report;
     }
     ++report.steps;
+    ++rounds.kept;
 
     const Inner inner = find_step(balance, u, force, all, step);
-    exhausted = inner == Inner::exhausted ? exhausted + 1 : 0;
+    rounds.exhausted = inner == Inner::exhausted ? rounds.exhausted + 1 : 0;
     if (inner == Inner::interrupted) {
       report.interrupted = true;
       return report;
     }
-    double length = std::min(1.0, largest_strain / steepest(step));
-    for (int attempt = 0;; ++attempt, length *= 0.5) {
-      vectors_.for_each([&](Index i) {
-        next[i] = u[i] + length * step[i];
-        // A whole step ends exactly on the target.
-        if (length == 1) {
-          next[i] =
-              by_components(balance.free[i], next[i]) + held_part(balance, i, balance.target[i]);
-        }
-      });
-      force = forces_without_contact(balance, next);
-      const double plain = potential(balance, next);
-      const double now = plain + contact_.energy(balance.obstacles, next);
-      // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
-      // that follows the surface has an energy only nearly: there, smaller residuals do as well.
-      const double rise = now - energy, rounding = 1e-10 * std::abs(energy);
-      const bool falls =
-          rise <= rounding ||
-          (!following_.empty() &&
-           residual(balance, next, with_contact(balance, next, force)) < report.residual);
-      if (std::isfinite(now) && (to_move > 0 || falls || attempt == most_cuts)) {
-        plain_energy = plain;
-        break;
-      }
-      if (attempt > 2 * most_cuts) {
+    const LineSearch searched = search_line({balance, energy, report.residual, to_move > 0}, u,
+                                            step, force, plain_energy, next);
+    if (searched != LineSearch::found) {
+      report.interrupted = searched == LineSearch::interrupted;
+      if (!report.interrupted) {
         report.why = "no part of a step leads to a state whose energy is finite";
-        return report;
       }
-      if (asked_to_stop(progress_.iteration, progress_.inner_residual)) {
-        report.interrupted = true;
-        return report;
-      }
+      return report;
     }
     u.swap(next);
+    rounds.renewal = contact_.can_keep() ? Renewal::motion : Renewal::all;
+  }
+}
+
+/// Shortens a step until the energy falls, or to where it hardly matters.
+/// @param force,energy receive forces and energy without contact after it. @param next receives the
+/// displacements there
+Newton::LineSearch Newton::search_line(const Start& start, const Vector& u, const Vector& step,
+                                       Vector& force, double& plain_energy, Vector& next) {
+  const Balance& balance = start.balance;
+  double length = std::min(1.0, largest_strain / steepest(step));
+  for (int attempt = 0;; ++attempt, length *= 0.5) {
+    vectors_.for_each([&](Index i) {
+      next[i] = u[i] + length * step[i];
+      // A whole step ends exactly on the target.
+      if (length == 1) {
+        next[i] =
+            by_components(balance.free[i], next[i]) + held_part(balance, i, balance.target[i]);
+      }
+    });
+    force = forces_without_contact(balance, next);
+    const double plain = potential(balance, next);
+    const double now = plain + contact_.energy(balance.obstacles, next);
+    // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
+    // that follows the surface has an energy only nearly: there, smaller residuals do as well.
+    const double rise = now - start.energy, rounding = 1e-10 * std::abs(start.energy);
+    const bool falls =
+        rise <= rounding ||
+        (!following_.empty() &&
+         residual(balance, next, with_contact(balance, next, force)) < start.residual);
+    if (std::isfinite(now) && (start.moves || falls || attempt == most_cuts)) {
+      plain_energy = plain;
+      return LineSearch::found;
+    }
+    if (attempt > 2 * most_cuts) return LineSearch::endless;
+    if (asked_to_stop(progress_.iteration, progress_.inner_residual)) {
+      return LineSearch::interrupted;
+    }
   }
 }
 
@@ -181,14 +259,14 @@ Newton::Vector Newton::with_contact(const Balance& balance, const Vector& u, Vec
 
 Newton::Vector Newton::acting_forces(const Balance& balance, const Vector& u) {
   Vector force = acting_without_contact(balance, u);
-  linearise_contact(balance, u);
+  linearise_contact(balance, u, Renewal::all);
   return with_contact(balance, u, std::move(force));
 }
 
 /// Call it where the backend has the displacements u.
-void Newton::linearise_contact(const Balance& balance, const Vector& u) {
+void Newton::linearise_contact(const Balance& balance, const Vector& u, Renewal renewal) {
   if (contact_.empty()) return;
-  contact_.linearise(balance.obstacles, u, balance.slip, [&] {
+  contact_.linearise(balance.obstacles, u, balance.slip, renewal, [&] {
     std::vector<Mat3d> gradient;
     backend_.displacement_gradients(gradient);
     ++evaluations_;

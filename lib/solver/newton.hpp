@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -52,6 +53,10 @@ struct NewtonReport {
 /// Newton's method with line search. The linear equations of each step are solved by conjugate
 /// gradients with differences of the backend's forces, so that all terms are included and no matrix
 /// is assembled. A step is shortened if it would strain the body too much or raise the energy.
+///
+/// Near a balance, a search keeps what its stiffness does not know of contact (`Renewal`) until the
+/// residual has fallen by a part, and then renews it; normal forces of friction are held until a
+/// balance is found with them.
 class Newton {
  public:
   using Vector = OwnedVectors::Vector;
@@ -81,11 +86,41 @@ class Newton {
   void set_applied(double time, Balance& balance) const;
 
  private:
+  /// How far a search has come, and what it keeps of contact.
+  struct Rounds {
+    Renewal renewal = Renewal::all;  ///< Of the next look at contact.
+    double renewed = 0;              ///< Residual when all of contact was found last.
+    int kept = 0;                    ///< Steps since then.
+    int of_normals = 0;              ///< Renewals of held normal forces.
+    double smallest = std::numeric_limits<double>::infinity();  ///< Residual.
+    int without_gain = 0;  ///< Renewals in a row that hardly reduced it.
+    int exhausted = 0;     ///< Steps in a row whose linear equations stayed unsolved.
+    void forget_gain() {
+      smallest = std::numeric_limits<double>::infinity();
+      without_gain = 0;
+    }
+  };
+  void hold_normals(const Balance& balance, Rounds& rounds, const NewtonReport& report);
+  bool renew_normals(const Balance& balance, Rounds& rounds);
+  bool takes_stock(const Balance& balance, const Vector& u, const Vector& force, double tolerance,
+                   bool is_placed, Vector& all, Rounds& rounds, NewtonReport& report);
+  bool must_renew(const Rounds& rounds, const Balance& balance, const Vector& u, const Vector& all,
+                  double tolerance) const;
+  /// Where a step starts: its balance, the energy and the residual there, and whether prescribed
+  /// phyxels move.
+  struct Start {
+    const Balance& balance;
+    double energy, residual;
+    bool moves;
+  };
+  enum class LineSearch { found, endless, interrupted };
+  LineSearch search_line(const Start& start, const Vector& u, const Vector& step, Vector& force,
+                         double& plain_energy, Vector& next);
   std::string why_to_end(const NewtonReport& report, int without_gain, int exhausted) const;
   Vector acting_without_contact(const Balance& balance, const Vector& u);
   Vector forces_without_contact(const Balance& balance, const Vector& u);
   /// Finds how bodies touch obstacles and each other at u.
-  void linearise_contact(const Balance& balance, const Vector& u);
+  void linearise_contact(const Balance& balance, const Vector& u, Renewal renewal);
   /// Adds the forces of contact at u to those without.
   Vector with_contact(const Balance& balance, const Vector& u, Vector force) const;
   void put(const Vector& u);

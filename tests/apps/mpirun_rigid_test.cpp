@@ -44,8 +44,7 @@ TEST_F(Mpirun, AFreeBodyInTheFloorIsRefusedOnce) {
         "[body.material]\nyoung = 1e6\npoisson = 0.3\ndensity = 1000\n");
   const Outcome outcome = run_on(3, {"run", "scene.toml", "--out", "out"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_EQ(count_of("obstacle \"ball\" is 0.01 m deep in obstacle \"floor\"", outcome.err),
-            1)
+  EXPECT_EQ(count_of("obstacle \"ball\" is 0.01 m deep in obstacle \"floor\"", outcome.err), 1)
       << outcome.err;
 }
 

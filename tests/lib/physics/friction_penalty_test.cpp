@@ -18,16 +18,19 @@ std::vector<Vec3d> slips() {
   return {1e-7 * a, 1e-3 * a + 5e-4 * b, 2.9e-3 * b, -3.1e-3 * a, 0.1 * a - 0.3 * b};
 }
 
+/// The direction that belongs to a slip: f₁ s/|s|.
+Vec3d direction(Vec3d slip) { return slip / slip_scale(norm(slip), limit.width()).length; }
+
 TEST(FrictionPenalty, IsTheDerivativeOfItsPotential) {
   for (const Vec3d slip : slips()) {
-    const PenaltyForce here = friction_penalty(limit, normal, slip, false);
+    const PenaltyForce here = friction_penalty(limit, normal, slip, direction(slip));
     EXPECT_GT(here.energy, 0);
     EXPECT_LT(std::abs(dot(here.force, normal)), 1e-12);
     const double step = 1e-5 * norm(slip);
     for (const Vec3d axis : {Vec3d{1, 0, 0}, Vec3d{0, 1, 0}, Vec3d{0, 0, 1}}) {
       const Vec3d way = step * along(normal, axis);
-      const PenaltyForce before = friction_penalty(limit, normal, slip - way, false),
-                         after = friction_penalty(limit, normal, slip + way, false);
+      const PenaltyForce before = friction_penalty(limit, normal, slip - way, {}),
+                         after = friction_penalty(limit, normal, slip + way, {});
       // Central differences: off by the square of the step, and by rounding over it.
       EXPECT_NEAR(-dot(here.force, way), 0.5 * (after.energy - before.energy),
                   1e-9 * norm(here.force) * norm(way) + 1e-15 * here.energy);
@@ -40,26 +43,55 @@ TEST(FrictionPenalty, IsTheDerivativeOfItsPotential) {
 TEST(FrictionPenalty, GrowsAsASpringUpToItsLimit) {
   const Vec3d way = normalised(cross(normal, Vec3d{0, 1, 0}));
   // f₁ = 2 y/ε - (y/ε)² at y = ε/2, and 1 from ε on.
-  EXPECT_NEAR(norm(friction_penalty(limit, normal, 1.5e-3 * way, false).force), 0.75 * 3, 1e-12);
-  EXPECT_NEAR(norm(friction_penalty(limit, normal, 3e-3 * way, false).force), 3, 1e-12);
-  EXPECT_NEAR(norm(friction_penalty(limit, normal, 1.0 * way, false).force), 3, 1e-12);
-  const Mat3d start = friction_penalty(limit, normal, {}, false).stiffness;
+  EXPECT_NEAR(norm(friction_penalty(limit, normal, 1.5e-3 * way, {}).force), 0.75 * 3, 1e-12);
+  EXPECT_NEAR(norm(friction_penalty(limit, normal, 3e-3 * way, {}).force), 3, 1e-12);
+  EXPECT_NEAR(norm(friction_penalty(limit, normal, 1.0 * way, {}).force), 3, 1e-12);
+  const Mat3d start = friction_penalty(limit, normal, {}, {}).stiffness;
   EXPECT_NEAR(dot(way, start * way), limit.stiffness, 1e-9);
   EXPECT_NEAR(norm(start * normal), 0, 1e-9);
   // Where nothing presses there is no friction, whatever the slip.
-  const PenaltyForce none = friction_penalty({.stiffness = 2000}, normal, way, false);
+  const PenaltyForce none = friction_penalty({.stiffness = 2000}, normal, way, {});
   EXPECT_EQ(none.force, Vec3d{});
   EXPECT_EQ(none.energy, 0);
 }
 
-TEST(FrictionPenalty, OfAPointThatTurnsRoundIsAsStiffAlongItsSlipAsAcross) {
-  const Vec3d slip = 0.01 * normalised(cross(normal, Vec3d{0, 1, 0}));
-  const PenaltyForce plain = friction_penalty(limit, normal, slip, false),
-                     careful = friction_penalty(limit, normal, slip, true);
-  EXPECT_EQ(plain.force, careful.force);
-  EXPECT_NEAR(norm(plain.stiffness * slip), 0, 1e-12);
-  // The spring that leads from the force here to none at the place without slip.
-  EXPECT_LE(norm(careful.stiffness * slip + careful.force), 1e-12);
+TEST(FrictionPenalty, IsNowhereOfNegativeStiffnessForAnyDirectionThatASearchHas) {
+  const Vec3d a = normalised(cross(normal, Vec3d{1, 0, 0})), b = cross(normal, a);
+  for (const Vec3d slip : slips()) {
+    for (const Vec3d way : {Vec3d{}, a, -b, 0.6 * a - 0.8 * b, 0.3 * b}) {
+      const PenaltyForce of_way = friction_penalty(limit, normal, slip, way);
+      EXPECT_EQ(of_way.force, friction_penalty(limit, normal, slip, direction(slip)).force);
+      const double aa = dot(a, of_way.stiffness * a), bb = dot(b, of_way.stiffness * b),
+                   ab = dot(a, of_way.stiffness * b);
+      const double rounding = 1e-12 * (aa + bb);
+      EXPECT_GE(aa, -rounding);
+      EXPECT_GE(bb, -rounding);
+      EXPECT_GE(aa * bb - ab * ab, -rounding * (aa + bb));
+    }
+  }
+}
+
+TEST(FrictionPenalty, FindsWhereAPullEndsThoughItsWidthIsAMillionthOfTheWay) {
+  // A spring of 1 N/mm pulls a point from 1 m away against 3 N: it ends 3 mm before its place.
+  const double spring = 1000;
+  const Vec3d across = normalised(cross(normal, Vec3d{0, 1, 0}));
+  for (const double width : {1e-3, 1e-6, 1e-9}) {
+    const FrictionLimit thin{.force = 3, .stiffness = 6 / width};
+    Vec3d slip = 1e-3 * cross(normal, across), way;
+    int steps = 0;
+    for (; steps < 60; ++steps) {
+      const PenaltyForce friction = friction_penalty(thin, normal, slip, way);
+      const Vec3d force = friction.force + spring * (across - slip);
+      if (norm(force) < 1e-9 * spring) break;
+      const Mat3d stiffness = friction.stiffness + spring * identity<double>();
+      const Vec3d next =
+          slip + (1 / determinant(stiffness)) * (transpose(cofactor(stiffness)) * force);
+      way = next_way(slip, way, thin.width(), next);
+      slip = next;
+    }
+    EXPECT_LE(steps, 20);
+    EXPECT_NEAR(dot(slip, across), 1 - 0.003, 1e-8);
+  }
 }
 
 /// A point above four phyxels of a surface that do not lie on a regular lattice.

@@ -209,7 +209,7 @@ TEST(AndersonMixing, SolvesLinearEquationsInAsManyStepsAsThereAreEigenvalues) {
   for (int k = 0; k < 5; ++k) {
     std::vector<double> f(4);
     for (std::size_t i = 0; i < 4; ++i) f[i] = (eigenvalue[i] - 1) * x[i] + b[i];
-    x = mixing.next(x, f, product);
+    x = mixing.next(x, f, 1, product);
   }
   for (std::size_t i = 0; i < 4; ++i) EXPECT_NEAR(x[i], b[i] / (1 - eigenvalue[i]), 1e-9);
 }

@@ -65,6 +65,29 @@ TEST(FrictionOfImplicitSteps, LetsABlockSlideAboveTheAngleOfFriction) {
   EXPECT_NEAR(contact.impulse.x, -0.3 * contact.impulse.z, 1e-3 * contact.impulse.z);
 }
 
+TEST(FrictionOfImplicitSteps, IsFoundWhereStiffBlocksLandInLongSteps) {
+  for (const std::string young : {"1e6", "1e7", "1e8"}) {
+    std::string text = slope("implicit", 0.3, "friction = 0.5\n",
+                             "translation = [0, 0, 0.02]\nvelocity = [0.5, 0, -0.5]\n");
+    text.replace(text.find("young = 1e5"), 11, "young = " + young);
+    Way way(text, 0.01);
+    const auto whole = [&] {  // with the energies of gravity and heat
+      return way.energy() + way.contacts()[0].friction_heat -
+             way.mass() * dot(way.model.gravity, way.centre());
+    };
+    const double start = whole();  // what the penalty stores meanwhile is not in it
+    for (int k = 0; k < 30; ++k) {
+      way.solver.step();
+      // Residuals of 1e-8 of the forces act over millimetres.
+      EXPECT_LE(whole(), (1 + 1e-5) * start) << young << ' ' << k;
+    }
+    const ContactReading contact = way.contacts()[0];
+    EXPECT_GT(contact.friction_heat, 0.05);
+    EXPECT_GT(contact.impulse.z, 0);
+    EXPECT_LE(std::abs(contact.impulse.x), 0.5 * contact.impulse.z);
+  }
+}
+
 TEST(FrictionOfImplicitSteps, IsTheKineticOneOfWhatSlides) {
   const auto acceleration_of = [](double speed, double friction) {
     Way way(

@@ -25,29 +25,52 @@ struct FrictionLimit {
   double width() const { return stiffness > 0 ? 2 * force / stiffness : 0; }
 };
 
-/// The friction of a slip, and its potential and stiffness.
-/// @param slip across the normal [m]
-/// @param is_careful true for the stiffness of a spring from the place without slip with the force
-/// of this slip: its energy is nowhere below the potential, so that a step of Newton's method does
-/// not lead beyond the place where the slip turns round, nor far from here
+/// What a slip y is divided by where it gives the direction of friction, f₁ s/y = s/η, and η'.
+struct SlipScale {
+  double length = 0;  ///< η [m]; y where friction is whole.
+  double slope = 1;   ///< η' [1]
+};
+inline SlipScale slip_scale(double y, double width) {
+  if (!(y < width)) return {y, 1};
+  const double length = width / (2 - y / width);
+  return {length, length * length / (width * width)};
+}
+
+/// The friction of a slip, its potential, and a stiffness of it.
+///
+/// With the second derivative, steps of Newton's method swing about places where a slip is whole
+/// in one direction and then in another. The stiffness here is that of the pair s - η w = 0,
+/// f = -μ N w in slip and friction, μ N/η (1 - η' ½ (w ŝ + ŝ w)), nowhere negative for |w| ≤ 1,
+/// which is the second derivative where w = s/η, the end of a search. Source: T. F. Chan, G. H.
+/// Golub, P. Mulet 1999 (A nonlinear primal-dual method for total variation-based image
+/// restoration, SIAM Journal on Scientific Computing 20, section 3), for the same potential.
+/// @param slip s, across the normal [m]
+/// @param way w: the direction of friction, as far as a search knows it (`next_way`)
 inline PenaltyForce friction_penalty(const FrictionLimit& limit, Vec3d normal, Vec3d slip,
-                                     bool is_careful) {
+                                     Vec3d way) {
   const Mat3d across = identity<double>() - outer(normal, normal);
   const double y = std::sqrt(dot(slip, slip)), width = limit.width();
-  if (y < width) {
-    const double rest = 1 - y / width;
-    // f₁/y and f₁'; along a slip of zero both are the same.
-    const double secant = 0.5 * limit.stiffness * (1 + rest), tangent = limit.stiffness * rest;
-    const Vec3d way = y > 0 ? slip / y : slip;
-    return {-secant * slip,
-            secant * across - (is_careful ? 0.0 : secant - tangent) * outer(way, way),
-            limit.force * y * y / width * (1 - y / (3 * width))};
-  }
-  if (!(y > 0)) return {{}, limit.stiffness * across, 0};
-  const double secant = limit.force / y;
-  const Vec3d way = slip / y;
-  return {-limit.force * way, secant * (is_careful ? across : across - outer(way, way)),
-          limit.force * (y - width / 3)};
+  if (!(width > 0)) return {{}, y > 0 ? Mat3d{} : limit.stiffness * across, 0};
+  const SlipScale scale = slip_scale(y, width);
+  const double secant = limit.force / scale.length;
+  const Vec3d slip_way = y > 0 ? slip / y : slip;
+  const Mat3d both = outer(way, slip_way) + outer(slip_way, way);
+  return {-secant * slip, secant * (across - 0.5 * scale.slope * both),
+          y < width ? limit.force * y * y / width * (1 - y / (3 * width))
+                    : limit.force * (y - width / 3)};
+}
+
+/// The direction of friction after a step of Newton's method.
+/// @param before,way the slip [m] and the direction before it. @param width ε before it [m]
+/// @param slip the slip after it [m]
+inline Vec3d next_way(Vec3d before, Vec3d way, double width, Vec3d slip) {
+  const double y = std::sqrt(dot(before, before));
+  const SlipScale scale = slip_scale(y, width);
+  if (!(scale.length > 0)) return {};
+  const double along = y > 0 ? dot(before, slip - before) / y : 0;
+  const Vec3d next = (slip - scale.slope * along * way) / scale.length;
+  const double size = std::sqrt(dot(next, next));
+  return size > 1 ? next / size : next;
 }
 
 /// The part of a phyxel of a surface in the slip of a point that it carries: D in
