@@ -102,6 +102,16 @@ DeviceArray<T> cleared(std::size_t count) {
   return array;
 }
 
+/// Entries of an array. @param numbers of these entries
+template <class T>
+DeviceArray<T> gathered(const DeviceArray<T>& values, const Numbers& numbers) {
+  DeviceArray<T> some(numbers.size(), name);
+  for_each("gather", count_of(numbers.size()),
+           [all = values.data(), some = some.data(),
+            numbers = numbers.data()] __device__(std::int64_t p) { some[p] = all[numbers[p]]; });
+  return some;
+}
+
 /// The candidates of this rank.
 Candidates candidates_of(const LayerView& layer, std::size_t count) {
   DeviceArray<char> flags(count, name);
@@ -181,37 +191,94 @@ DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerVi
   return keys;
 }
 
-/// The rows of entries.
-Found rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
-              const Numbers& by_list) {
-  const std::size_t n = points.size(), entries = keys.size();
-  Found found;
-  found.near = {entries, name};
-  Numbers begins(entries, name);
+/// Where entries are and whether rows begin there.
+struct Entries {
+  DeviceArray<std::uint64_t> keys;
+  Numbers near;    ///< Their candidates.
+  Numbers begins;  ///< 1 at the first entry of a row, else 0.
+};
+
+/// Entries in rows by points and bodies, and by patches if they have some.
+Entries entries_of(DeviceArray<std::uint64_t> keys, const Candidates& points,
+                   const Numbers& by_list, const Numbers& patch) {
+  const std::size_t entries = keys.size();
+  Entries found{std::move(keys), {entries, name}, {entries, name}};
   for_each("begin_rows", count_of(entries),
-           [keys = keys.data(), near = found.near.data(), begins = begins.data(),
-            points = points.data(), by_list = by_list.data(), n] __device__(std::int64_t e) {
+           [keys = found.keys.data(), near = found.near.data(), begins = found.begins.data(),
+            points = points.data(), by_list = by_list.data(), patch = patch.data(),
+            n = points.size()] __device__(std::int64_t e) {
              const Index k = by_list[keys[e] % n];
              near[e] = k;
              begins[e] = e == 0 || keys[e - 1] / n != keys[e] / n ||
-                         points[by_list[keys[e - 1] % n]].body != points[k].body;
+                         points[by_list[keys[e - 1] % n]].body != points[k].body ||
+                         (patch && patch[e - 1] != patch[e]);
            });
-  const Numbers sums = running_sums(begins);
-  found.row_of_entry = {entries, name};
+  return found;
+}
+
+/// Sorts the entries of each point and body by the patches of the surface, and returns these.
+Numbers sort_by_patches(Entries& entries, const Candidates& points) {
+  const std::size_t count = entries.keys.size();
+  const Numbers sums = running_sums(entries.begins);
+  const auto rows = static_cast<std::size_t>(last_of(sums));
+  Numbers row(count, name), patch(count, name);
+  for_each("number_rows", count_of(count),
+           [sums = sums.data(), row = row.data()] __device__(std::int64_t e) {
+             row[e] = sums[e + 1] - 1;
+           });
+  const DeviceArray<Offset> start = starts_of<Offset>(row, rows, name);
+  for_each("find_patches", count_of(rows),
+           [start = start.data(), near = entries.near.data(), patch = patch.data(),
+            points = points.data()] __device__(std::int64_t r) {
+             const Offset first = start[r];
+             find_patches(
+                 static_cast<Index>(start[r + 1] - first),
+                 [&](Index k) -> const SurfaceSite& { return points[near[first + k]].site; },
+                 [&](Index k) -> Index& { return patch[first + k]; });
+           });
+  const auto most = static_cast<std::uint64_t>(reduce(patch.data(), count_of(count), 0, Larger{}));
+  if (most == 0) return {};
+  DeviceArray<std::uint64_t> order(count, name);
+  Numbers sorted(count, name);
+  for_each("order_patches", count_of(count),
+           [row = row.data(), patch = patch.data(), order = order.data(), sorted = sorted.data(),
+            most] __device__(std::int64_t e) {
+             order[e] = static_cast<std::uint64_t>(row[e]) * (most + 1) +
+                        static_cast<std::uint64_t>(patch[e]);
+             sorted[e] = static_cast<Index>(e);
+           });
+  sort_pairs(order, sorted, bits_below(rows * (most + 1)));
+  entries.keys = gathered(entries.keys, sorted);
+  return gathered(patch, sorted);
+}
+
+/// The rows of entries.
+Found rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
+              const Numbers& by_list) {
+  const std::size_t n = points.size(), count = keys.size();
+  Found found;
+  Entries entries = entries_of(std::move(keys), points, by_list, {});
+  Numbers patch;
+  if (count > 0) patch = sort_by_patches(entries, points);
+  if (patch.size() > 0) entries = entries_of(std::move(entries.keys), points, by_list, patch);
+  const Numbers sums = running_sums(entries.begins);
+  found.near = std::move(entries.near);
+  found.row_of_entry = {count, name};
   found.rows = {static_cast<std::size_t>(last_of(sums)), name};
-  for_each("make_rows", count_of(entries),
-           [layer, keys = keys.data(), near = found.near.data(), begins = begins.data(),
-            sums = sums.data(), points = points.data(), row_of_entry = found.row_of_entry.data(),
+  for_each("make_rows", count_of(count),
+           [layer, keys = entries.keys.data(), near = found.near.data(),
+            begins = entries.begins.data(), patch = patch.data(), sums = sums.data(),
+            points = points.data(), row_of_entry = found.row_of_entry.data(),
             rows = found.rows.data(), n] __device__(std::int64_t e) {
              const Index row = sums[e + 1] - 1;
              row_of_entry[e] = row;
              if (!begins[e]) return;
              const auto p = static_cast<Index>(keys[e] / n);
              const Index body = points[near[e]].body;
-             rows[row] =
-                 row_of(points[p], p, body, layer.law[layer.partner_of(points[p].body, body)]);
+             rows[row] = row_of(points[p], p, body, patch ? patch[e] : 0,
+                                layer.law[layer.partner_of(points[p].body, body)]);
            });
-  found.keys = std::move(keys);
+  found.keys = std::move(entries.keys);
   return found;
 }
 
@@ -345,16 +412,6 @@ void set_tiles(DeviceTouchingPoints::Own& own, Index tiles) {
             entry = own.entry.data()] __device__(std::int64_t p) {
              entry[p] = number[place[p] / tile_size] * tile_size + place[p] % tile_size;
            });
-}
-
-/// Entries of an array of the layer. @param numbers of these entries in the layer
-template <class T>
-DeviceArray<T> gathered(const DeviceArray<T>& of_layer, const Numbers& numbers) {
-  DeviceArray<T> some(numbers.size(), name);
-  for_each("gather", count_of(numbers.size()),
-           [all = of_layer.data(), some = some.data(),
-            numbers = numbers.data()] __device__(std::int64_t p) { some[p] = all[numbers[p]]; });
-  return some;
 }
 
 }  // namespace

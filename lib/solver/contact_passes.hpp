@@ -89,7 +89,8 @@ struct ContactPasses {
     found.mobility = (1 / site[here.point].area) *
                      (threads.sum(mobility) + share[here.point] * site[here.point].mobility);
     found.target = target_velocity(touch[r], relative_velocity(threads, r),
-                                   motion[here.point].earlier - threads.sum(earlier), here.law, dt);
+                                   motion[here.point].earlier - threads.sum(earlier), here.law,
+                                   site[here.point].range, dt);
     if (threads.is_first()) response[r] = found;
   }
   template <class Threads>

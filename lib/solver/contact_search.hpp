@@ -61,8 +61,8 @@ PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& ot
 }
 
 /// Numbers the patches of a body's surface that are near a point: phyxels of two limbs, which are
-/// far from each other at rest, lead to no place between these. What is connected at rest by ways of
-/// `ranges_apart` ranges is one patch; patches are in the order of their first phyxels.
+/// far from each other at rest, lead to no place between these. What is connected at rest by ways
+/// of `ranges_apart` ranges is one patch; patches are in the order of their first phyxels.
 /// @param count number of phyxels. @param site_of returns that of a phyxel. @param patch_of returns
 /// a reference to the number of its patch, which is set. @returns the number of patches
 template <class SiteOf, class PatchOf>

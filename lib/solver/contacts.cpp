@@ -139,21 +139,23 @@ void check_rigid(const Model& model, std::span<const RigidState> rigid) {
 /// Refuses readings of phyxels that an obstacle has left inside another one, or that it cannot
 /// hold.
 void check_depths(const Model& model, const std::vector<ContactReading>& readings) {
-  constexpr double deepest = 0.25;
+  // Surfaces of bodies are looked at from half a spacing inside, so that what is deeper than a
+  // spacing, 0.45 supports, is led out on the wrong side.
+  constexpr double in_obstacle = 0.25, in_body = 0.45;
   const double support = smallest_support(model);
   for (const ContactReading& reading : readings) {
-    if (!(reading.depth > deepest * support)) continue;
     const bool is_body = reading.shape == body_shape;
+    const double deepest = (is_body ? in_body : in_obstacle) * support;
+    if (!(reading.depth > deepest)) continue;
     const std::string whose = is_body ? fmt::format(" of body \"{}\"", reading.obstacle) : "";
     const std::string where = !is_body ? fmt::format("obstacle \"{}\"", reading.obstacle)
                               : model.body_contact.self ? "other bodies or other parts of it"
                                                         : "other bodies";
-    say_wrong(
-        model,
-        fmt::format("phyxels{} are {:.3g} m deep in {}, a quarter of a support of {:.3g} m is "
-                    "allowed: something presses them into it, or they are too fast for the step{}",
-                    whose, reading.depth, where, support,
-                    has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
+    say_wrong(model, fmt::format(
+                         "phyxels{} are {:.3g} m deep in {}, {:.3g} m is allowed, {} of a support: "
+                         "something presses them into it, or they are too fast for the step{}",
+                         whose, reading.depth, where, deepest, is_body ? in_body : in_obstacle,
+                         has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
   }
 }
 

@@ -39,8 +39,8 @@ State next_state(const Model& model, const SupportInstant& now, const State& sta
 
 NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
                    const State& state) {
-  StepContacts contacts(model, 1);
-  BodyContacts bodies(model, 1);
+  StepContacts contacts(model, std::max(1, backend.threads()));
+  BodyContacts bodies(model, std::max(1, backend.threads()));
   const std::vector<Index>& layer =
       bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
   State next = next_state(model, now, state, layer);

@@ -27,7 +27,7 @@ void add_obstacles(const Model& model, const State& state, double time, PresentC
 
 void add_bodies(const Model& model, Backend& backend, const State& state, double dt,
                 PresentContact& found) {
-  BodyContacts bodies(model, 1);
+  BodyContacts bodies(model, std::max(1, backend.threads()));
   const auto get = [&](Index i) { return SurfaceState{state.displacement[i], state.velocity[i]}; };
   bodies.begin_step(dt, get);
   if (!bodies.any()) return;

@@ -66,7 +66,7 @@ void RigidContacts::add_touch(const Placed& of_tips, const Placed& other, Vec3d 
   add(of_tips, 1, touch.arm);
   add(other, -1, touch.other_arm);
   const SurfaceTouch as_surface{.is_inside = true, .gap = gap.distance, .normal = gap.normal};
-  touch.target = target_velocity(as_surface, now, before, law, dt);
+  touch.target = target_velocity(as_surface, now, before, law, HUGE_VAL, dt);
   touches_.push_back(touch);
 }
 

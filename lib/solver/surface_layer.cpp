@@ -47,20 +47,21 @@ Box together(Box a, const Box& b) {
 SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
   if (!model.body_contact.acts()) return;
   const std::vector<Vec3d> free = free_axes(model);
-  double least = HUGE_VAL;
-  for (std::size_t k = 0; k < phyxels().size(); ++k) {
-    const Index i = phyxels()[k], body = part_of(model, i).body;
+  bodies_ = tabulated(phyxels().size(),
+                      [&](std::size_t k) { return part_of(model, phyxels()[k]).body; });
+  sites_ = tabulated(phyxels().size(), [&](std::size_t k) {
+    const Index i = phyxels()[k];
     const double range = model.neighbourhood.support[i];
     SurfaceSite site{.rest = model.position[i],
                      .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
                      .area = model.volume[i] / range,
                      .offset = model.body_contact.layer.offset[k],
                      .range = range};
-    look_around(site, model.body_contact.distances[body].view());
-    sites_.push_back(site);
-    bodies_.push_back(body);
-    least = std::min(least, range);
-  }
+    look_around(site, model.body_contact.distances[bodies_[k]].view());
+    return site;
+  });
+  double least = HUGE_VAL;
+  for (const SurfaceSite& site : sites_) least = std::min(least, site.range);
   groups_ = groups_of(model, model.body_contact.layer);
   if (model.share) least = model.share->communicator->smallest(least);
   skin_ = share_of_range * least;

@@ -77,6 +77,7 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
   std::vector<Vec3d> position;
   for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
   std::size_t most = 0;
+  int patches = 0;
   for (int search = 0; search < 3; ++search) {
     const double dt = search < 2 ? 1e-4 : 2e-4;
     host.find(position, dt);
@@ -99,6 +100,8 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
       const ContactRow& expected = host.rows()[r];
       ASSERT_EQ(rows[r].point, expected.point);
       ASSERT_EQ(rows[r].body, expected.body);
+      ASSERT_EQ(rows[r].patch, expected.patch);
+      patches += rows[r].patch > 0;
       ASSERT_EQ(rows[r].law.static_friction, expected.law.static_friction);
       ASSERT_EQ(rows[r].law.restitution, expected.law.restitution);
       ASSERT_EQ(rows[r].apart, expected.apart);
@@ -113,8 +116,17 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
     }
     most = std::max(most, rows.size());
     for (Vec3d& x : position) x += {shift(random), shift(random), shift(random)};
+    if (search != 1) continue;
+    // Both ends of a body beside the same points, and nothing of it between them.
+    for (std::size_t k = 0; k < position.size(); ++k) {
+      const double from_middle = layer.sites()[k].rest.x - 0.205;
+      if (layer.bodies()[k] != 1) continue;
+      if (std::abs(from_middle) < 0.08) position[k].z += 1;
+      if (from_middle > 0.08) position[k].x -= 0.15;
+    }
   }
   EXPECT_GT(most, 200u);
+  EXPECT_GT(patches, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(

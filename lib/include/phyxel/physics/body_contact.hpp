@@ -170,6 +170,35 @@ PHYXEL_HD Sym3<double> inverse_along(Vec3<double> n, const Sym3<double>& t) {
           p * u.y * u.z + s * v.y * v.z, p * u.z * u.z + s * v.z * v.z};
 }
 
+/// The gap of a place beside a deformed surface, and its unit normal; zero if it has none.
+/// @param gap that of its place at rest. @param level that of the surface [m]
+/// @param back inverse of the deformation gradient
+PHYXEL_HD Gap deformed_gap(const Gap& gap, double level, const Mat3<double>& back) {
+  const Vec3<double> m = transpose(back) * gap.normal;
+  const double length = std::sqrt(dot(m, m));
+  if (!(length > 0)) return {0, {}};
+  return {(gap.distance - level) / length, (1 / length) * m};
+}
+
+/// What is added to the gap of a point that no phyxel of a surface is near, as a share of its
+/// range. A surface that is touched has phyxels within half a range, of weight 0.4; gradients of
+/// phyxels at the rim of the range say little of the place of a point.
+/// @param weights Σ w
+PHYXEL_HD double distance_of_lone_point(double weights) {
+  constexpr double enough = 0.4, most = 0.3;
+  return weights < enough ? most * (1 - weights / enough) : 0;
+}
+
+/// How much the places at rest to which phyxels of a surface lead a point disagree: not at all
+/// where they are within a quarter of a range, entirely from half a range on. So they do in the
+/// crease of a folded limb, whose two walls lead to places far apart, with the inside of the body
+/// between them.
+/// @param square of their spread [m²]
+PHYXEL_HD double doubt_of_place(double square, double range) {
+  const double t = 4 * std::sqrt(square > 0 ? square : 0.0) / range - 1;
+  return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
+}
+
 /// Finds whether a point is inside a body, from the phyxels of the body's surface near it, and how
 /// these carry it.
 /// @param threads share the phyxels among them (`OneThread`); all return the same
@@ -196,6 +225,9 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   Mat3<double> back{};                  // Σ w G
   Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
   double level = 0, weights = 0;        // Σ w φ(X), Σ w
+  Vec3<double> here{};                  // Σ w (X + G (q - y)), from the rest of the first one
+  double square = 0;                    // Σ w of its square
+  const Vec3<double> first = site_of(list[0]).rest;
   const Vec3<double> place = point.after + point.probe;
   threads.each(list, [&](Offset k) {
     const SurfaceMotion& other = motion_of(k);
@@ -205,25 +237,48 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
     weights += w;
     back += w * other.back;
     rest += w * site_of(k).rest;
-    led += w * (other.back * way);
+    const Vec3<double> whole = other.back * way, at = site_of(k).rest - first + whole;
+    led += w * whole;
+    here += w * at;
+    square += w * dot(at, at);
     apart += w * way;
     level += w * site_of(k).level;
   });
   weights = threads.sum(weights);
-  if (!(weights > 0)) return touch;
+  constexpr double least_weight = 0.05;
+  if (!(weights > least_weight)) return touch;
   const double scale = 1 / weights;
   back = scale * threads.sum(back);
   const Vec3<double> x =
       scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
   // What leads back to the point's own neighbourhood is no other part of the body.
   if (const Vec3<double> way = x - site.rest; dot(way, way) < least * least) return touch;
-  const Gap gap = field.gap(x);
-  const Vec3<double> m = transpose(back) * gap.normal;
-  const double length = std::sqrt(dot(m, m));
-  if (!(length > 0)) return touch;
-  touch.normal = (1 / length) * m;
-  touch.gap = (gap.distance - scale * threads.sum(level)) / length -
-              dot(touch.normal, point.probe) - site.offset;
+  here = scale * threads.sum(here);
+  const double spread_of_rest = scale * threads.sum(square) - dot(here, here);
+  const double doubt = doubt_of_place(spread_of_rest, site.range);
+  const double own_level = scale * threads.sum(level);
+  Gap gap = deformed_gap(field.gap(x), own_level, back);
+  if (doubt > 0) {
+    double distance = 0;
+    Vec3<double> normal{};
+    threads.each(list, [&](Offset k) {
+      const SurfaceMotion& other = motion_of(k);
+      const double w = facing(point, other) * surface_weight(square_of(k), range_of(k));
+      if (!(w > 0)) return;
+      const Vec3<double> at = site_of(k).rest + other.back * (place - other.after);
+      const Gap own = deformed_gap(field.gap(at), own_level, other.back);
+      distance += w * own.distance;
+      normal += w * own.normal;
+    });
+    gap.distance += doubt * (scale * threads.sum(distance) - gap.distance);
+    gap.normal += doubt * (scale * threads.sum(normal) - gap.normal);
+  }
+  const double length = std::sqrt(dot(gap.normal, gap.normal));
+  constexpr double shortest = 0.3;  // opposite walls have no common normal
+  if (!(length > shortest)) return touch;
+  touch.normal = (1 / length) * gap.normal;
+  touch.gap = gap.distance - dot(touch.normal, point.probe) - site.offset +
+              distance_of_lone_point(weights) * site.range;
   if (!(touch.gap < reach * site.range) ||
       dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
     return touch;
@@ -285,13 +340,16 @@ PHYXEL_HD double mobility_along(Vec3<double> mobility, Vec3<double> way) {
 ///
 /// where v is the velocity of the point relative to the surface before contact, v⁻ that at the
 /// start of the step, and e the restitution, which counts for points that approach. Where the point
-/// was inside as the step started, g⁻ < 0, a fifth of it is made good, so that points that come
-/// upon each other deep inside, as at corners, are not flung apart.
+/// was inside as the step started, g⁻ < 0, a fifth of it is made good, up to a hundredth of a
+/// range, so that points that come upon each other deep inside, as at corners, are not flung apart.
+/// @param range of the point [m]
 PHYXEL_HD double target_velocity(const SurfaceTouch& touch, Vec3<double> velocity,
-                                 Vec3<double> earlier, const ContactLaw& law, double dt) {
+                                 Vec3<double> earlier, const ContactLaw& law, double range,
+                                 double dt) {
   const double ahead = dot(touch.normal, velocity), before = touch.gap / dt - ahead;
-  constexpr double recovery = 0.2;
-  const double closing = before < 0 ? -recovery * before : -before;
+  constexpr double recovery = 0.2, most = 0.01;
+  const double fifth = -recovery * before, limit = most * range / dt;
+  const double closing = before >= 0 ? -before : fifth < limit ? fifth : limit;
   const double approach = -dot(touch.normal, earlier);
   if (!(law.restitution > 0 && approach > 0)) return closing;
   const double rebound = ahead + (1 + law.restitution) * approach;
