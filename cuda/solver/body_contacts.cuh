@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "setup/device_touching_points.hpp"
 #include "solver/body_contact_kernels.cuh"
 #include "solver/contact_stiffness.hpp"
 #include "solver/contact_watch.hpp"
@@ -13,7 +14,6 @@
 #include "solver/device_distances.cuh"
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
-#include "solver/device_touching_points.hpp"
 #include "solver/passes.cuh"
 #include "solver/thread_group.cuh"
 

@@ -139,9 +139,7 @@ void check_rigid(const Model& model, std::span<const RigidState> rigid) {
 /// Refuses readings of phyxels that an obstacle has left inside another one, or that it cannot
 /// hold.
 void check_depths(const Model& model, const std::vector<ContactReading>& readings) {
-  // Surfaces of bodies are looked at from half a spacing inside, so that what is deeper than a
-  // spacing, 0.45 supports, is led out on the wrong side.
-  constexpr double in_obstacle = 0.25, in_body = 0.45;
+  constexpr double in_obstacle = 0.25, in_body = 1;
   const double support = smallest_support(model);
   for (const ContactReading& reading : readings) {
     const bool is_body = reading.shape == body_shape;
@@ -160,6 +158,13 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
 }
 
 }  // namespace
+
+double trusted_depth_in_bodies(const Model& model) {
+  // Surfaces of bodies are looked at from half a spacing inside: what is deeper than a spacing may
+  // be led out on the wrong side.
+  constexpr double spacing = 0.45;  // over a support
+  return model.body_contact.acts() ? spacing * smallest_support(model) : 0;
+}
 
 void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
                           std::span<const RigidState> rigid) {

@@ -12,6 +12,7 @@
 #include "rank_exchange.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "tabulated.hpp"
+#include "timeline.hpp"
 
 namespace phyxel {
 namespace {
@@ -47,8 +48,8 @@ Box together(Box a, const Box& b) {
 SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
   if (!model.body_contact.acts()) return;
   const std::vector<Vec3d> free = free_axes(model);
-  bodies_ = tabulated(phyxels().size(),
-                      [&](std::size_t k) { return part_of(model, phyxels()[k]).body; });
+  bodies_ =
+      tabulated(phyxels().size(), [&](std::size_t k) { return part_of(model, phyxels()[k]).body; });
   sites_ = tabulated(phyxels().size(), [&](std::size_t k) {
     const Index i = phyxels()[k];
     const double range = model.neighbourhood.support[i];
@@ -105,6 +106,7 @@ BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position) const {
 }
 
 BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes) const {
+  const Phase phase("bodies near each other");
   BodyReach reach{.boxes = std::vector(model_.body_contact.distances.size(), no_box),
                   .partners = {}};
   for (std::size_t g = 0; g < groups_.size(); ++g) {

@@ -7,9 +7,9 @@
 
 #include "model/assembly.hpp"
 #include "phyxel/solver.hpp"
+#include "setup/device_touching_points.hpp"
 #include "setup/tiling.hpp"
 #include "solver/body_contacts.hpp"
-#include "solver/device_touching_points.hpp"
 #include "support/backend.hpp"
 #include "support/contact_scene.hpp"
 

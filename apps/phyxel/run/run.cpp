@@ -105,6 +105,7 @@ void Run::execute() {
       begin_ ? begin_->info.watched
              : Watched{now_.total_energy(), now_.largest_speed, now_.kinetic_and_elastic_energy()};
   peak_energy_ = std::max(watched_.peak_energy, now_.kinetic_and_elastic_energy());
+  trusted_depth_ = trusted_depth_in_bodies(model());
   readings_ = read_off();
   if (finished) checkpoint_ = resumed_from_;
   if (!finished) step_to_end();

@@ -211,6 +211,7 @@ class Run {
   std::vector<int> gpus_;                  // GPU of each rank
   std::shared_ptr<const GoodState> good_;  // last good state
   Watched watched_;                        // for checkpoints: start and frames
+  double trusted_depth_ = 0;               // in other bodies [m]
   double peak_energy_ = 0;                 // largest energy of the checked states [J]
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // loop includes output
   Clock::time_point loop_start_;

@@ -41,6 +41,10 @@ struct RigidReading {
 std::vector<RigidReading> read_rigid_bodies(const Model& model, const Backend& backend,
                                             const Solver& solver);
 
+/// The depth of a phyxel in another body [m] beyond which contact may lead it out on the wrong
+/// side: a distance between phyxels; 0 where no bodies touch. Of a share: collective.
+double trusted_depth_in_bodies(const Model& model);
+
 /// A number of such a reading: a column of `rigid.csv`.
 struct RigidColumn {
   const char* name;
@@ -58,7 +62,8 @@ const char* shape_name(const Obstacle& obstacle);
 /// found from one evaluation of the forces, without taking it. Sums are exact: they do not depend
 /// on the number of threads and ranks. Of a share: those of the whole model; collective, for a
 /// solver that was made with the model.
-/// @throws DivergedError if a phyxel is deeper in an obstacle than a quarter of a support
+/// @throws DivergedError if a phyxel is deeper in an obstacle than a quarter of a support, or in
+/// another body than a support
 std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver);
 

@@ -199,6 +199,77 @@ PHYXEL_HD double doubt_of_place(double square, double range) {
   return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
 }
 
+/// Where a place beside a deformed surface is at rest, and its gap.
+struct PlaceAtRest {
+  double weights = 0;  ///< Σ w, before it is made 1; the rest is known above `least_weight`.
+  Vec3<double> place;  ///< X(q) [m]
+  Gap gap;             ///< Its normal may be shorter than 1, where walls have none in common.
+};
+/// Weight of phyxels below which they say nothing of a place.
+inline constexpr double least_weight = 0.05;
+
+/// Finds where the place q of a point is at rest. The parameters are those of `surface_touch`.
+template <class Threads, class SiteOf, class MotionOf>
+PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& site,
+                                    const SurfaceMotion& point, const Offset* list,
+                                    SiteOf&& site_of, MotionOf&& motion_of,
+                                    const PlacedDistances& field) {
+  PlaceAtRest found;
+  const Vec3<double> q = point.after + point.probe;
+  const auto weight_of = [&](Offset k) {
+    const Vec3<double> apart = motion_of(k).after - point.after;
+    return facing(point, motion_of(k)) *
+           surface_weight(dot(apart, apart), common_range(site.range, site_of(k).range));
+  };
+  Mat3<double> back{};                  // Σ w G
+  Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
+  double level = 0, weights = 0;        // Σ w φ(X), Σ w
+  Vec3<double> here{};                  // Σ w (X + G (q - y)), from the point at rest
+  double square = 0;                    // Σ w of its square
+  threads.each(list, [&](Offset k) {
+    const SurfaceMotion& other = motion_of(k);
+    const double w = weight_of(k);
+    if (!(w > 0)) return;
+    const Vec3<double> way = q - other.after;
+    weights += w;
+    back += w * other.back;
+    rest += w * site_of(k).rest;
+    const Vec3<double> whole = other.back * way, at = site_of(k).rest - site.rest + whole;
+    led += w * whole;
+    here += w * at;
+    square += w * dot(at, at);
+    apart += w * way;
+    level += w * site_of(k).level;
+  });
+  found.weights = weights = threads.sum(weights);
+  if (!(weights > least_weight)) return found;
+  const double scale = 1 / weights;
+  back = scale * threads.sum(back);
+  found.place = scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
+  here = scale * threads.sum(here);
+  const double spread_of_rest = scale * threads.sum(square) - dot(here, here);
+  const double doubt = doubt_of_place(spread_of_rest, site.range);
+  const double own_level = scale * threads.sum(level);
+  Gap& gap = found.gap;
+  gap = deformed_gap(field.gap(found.place), own_level, back);
+  if (doubt > 0) {
+    double distance = 0;
+    Vec3<double> normal{};
+    threads.each(list, [&](Offset k) {
+      const SurfaceMotion& other = motion_of(k);
+      const double w = weight_of(k);
+      if (!(w > 0)) return;
+      const Vec3<double> at = site_of(k).rest + other.back * (q - other.after);
+      const Gap own = deformed_gap(field.gap(at), own_level, other.back);
+      distance += w * own.distance;
+      normal += w * own.normal;
+    });
+    gap.distance += doubt * (scale * threads.sum(distance) - gap.distance);
+    gap.normal += doubt * (scale * threads.sum(normal) - gap.normal);
+  }
+  return found;
+}
+
 /// Finds whether a point is inside a body, from the phyxels of the body's surface near it, and how
 /// these carry it.
 /// @param threads share the phyxels among them (`OneThread`); all return the same
@@ -217,68 +288,21 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
                                      SurfaceShare* shares) {
   SurfaceTouch touch;
   threads.each(list, [&](Offset k) { shares[k] = {}; });
+  const PlaceAtRest rest = place_at_rest(threads, site, point, list, site_of, motion_of, field);
+  if (!(rest.weights > least_weight)) return touch;
   const auto square_of = [&](Offset k) {
     const Vec3<double> apart = motion_of(k).after - point.after;
     return dot(apart, apart);
   };
   const auto range_of = [&](Offset k) { return common_range(site.range, site_of(k).range); };
-  Mat3<double> back{};                  // Σ w G
-  Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
-  double level = 0, weights = 0;        // Σ w φ(X), Σ w
-  Vec3<double> here{};                  // Σ w (X + G (q - y)), from the rest of the first one
-  double square = 0;                    // Σ w of its square
-  const Vec3<double> first = site_of(list[0]).rest;
-  const Vec3<double> place = point.after + point.probe;
-  threads.each(list, [&](Offset k) {
-    const SurfaceMotion& other = motion_of(k);
-    const double w = facing(point, other) * surface_weight(square_of(k), range_of(k));
-    if (!(w > 0)) return;
-    const Vec3<double> way = place - other.after;
-    weights += w;
-    back += w * other.back;
-    rest += w * site_of(k).rest;
-    const Vec3<double> whole = other.back * way, at = site_of(k).rest - first + whole;
-    led += w * whole;
-    here += w * at;
-    square += w * dot(at, at);
-    apart += w * way;
-    level += w * site_of(k).level;
-  });
-  weights = threads.sum(weights);
-  constexpr double least_weight = 0.05;
-  if (!(weights > least_weight)) return touch;
-  const double scale = 1 / weights;
-  back = scale * threads.sum(back);
-  const Vec3<double> x =
-      scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
   // What leads back to the point's own neighbourhood is no other part of the body.
-  if (const Vec3<double> way = x - site.rest; dot(way, way) < least * least) return touch;
-  here = scale * threads.sum(here);
-  const double spread_of_rest = scale * threads.sum(square) - dot(here, here);
-  const double doubt = doubt_of_place(spread_of_rest, site.range);
-  const double own_level = scale * threads.sum(level);
-  Gap gap = deformed_gap(field.gap(x), own_level, back);
-  if (doubt > 0) {
-    double distance = 0;
-    Vec3<double> normal{};
-    threads.each(list, [&](Offset k) {
-      const SurfaceMotion& other = motion_of(k);
-      const double w = facing(point, other) * surface_weight(square_of(k), range_of(k));
-      if (!(w > 0)) return;
-      const Vec3<double> at = site_of(k).rest + other.back * (place - other.after);
-      const Gap own = deformed_gap(field.gap(at), own_level, other.back);
-      distance += w * own.distance;
-      normal += w * own.normal;
-    });
-    gap.distance += doubt * (scale * threads.sum(distance) - gap.distance);
-    gap.normal += doubt * (scale * threads.sum(normal) - gap.normal);
-  }
-  const double length = std::sqrt(dot(gap.normal, gap.normal));
+  if (const Vec3<double> way = rest.place - site.rest; dot(way, way) < least * least) return touch;
+  const double length = std::sqrt(dot(rest.gap.normal, rest.gap.normal));
   constexpr double shortest = 0.3;  // opposite walls have no common normal
   if (!(length > shortest)) return touch;
-  touch.normal = (1 / length) * gap.normal;
-  touch.gap = gap.distance - dot(touch.normal, point.probe) - site.offset +
-              distance_of_lone_point(weights) * site.range;
+  touch.normal = (1 / length) * rest.gap.normal;
+  touch.gap = rest.gap.distance - dot(touch.normal, point.probe) - site.offset +
+              distance_of_lone_point(rest.weights) * site.range;
   if (!(touch.gap < reach * site.range) ||
       dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
     return touch;

@@ -30,6 +30,7 @@ struct SlipScale {
   double length = 0;  ///< η [m]; y where friction is whole.
   double slope = 1;   ///< η' [1]
 };
+/// What a slip is divided by. @param y its size [m]. @param width ε [m]
 inline SlipScale slip_scale(double y, double width) {
   if (!(y < width)) return {y, 1};
   const double length = width / (2 - y / width);

@@ -3,16 +3,15 @@
 #include <utility>
 
 #include "model/parts.hpp"
-#include "setup/device_hash.cuh"
-#include "setup/primitives.cuh"
+#include "setup/contact_rows.cuh"
+#include "setup/device_touching_points.hpp"
 #include "setup/tiling.hpp"
-#include "solver/device_touching_points.hpp"
 #include "timeline.hpp"
 
 namespace phyxel::cuda {
 namespace {
 
-constexpr const char* name = "contact";
+constexpr const char* name = contact_arrays;
 constexpr int group_threads = 256;
 
 /// Finds the box of each group of a layer, grown by the ranges of its phyxels. One block per group.
@@ -30,260 +29,8 @@ __global__ void find_boxes(const Vec3d* position, const SurfaceSite* site, const
   if (threadIdx.x == 0) boxes[blockIdx.x] = all;
 }
 
-/// The layer and the bodies as kernels see them.
-struct LayerView {
-  const Vec3d* position;
-  const SurfaceSite* site;
-  const double* gain;
-  const Index *id, *body;
-  const Box* box;  ///< Of bodies.
-  const Index *partner_start, *partner;
-  const ContactLaw* law;  ///< Of partners.
-  double skin;
-  int rank;
-
-  /// The number of a body among the partners of all; -1 if two do not touch.
-  __device__ Index partner_of(Index body, Index other) const {
-    for (Index k = partner_start[body]; k < partner_start[body + 1]; ++k) {
-      if (partner[k] == other) return k;
-    }
-    return -1;
-  }
-  __device__ bool is_near_others(Index k) const {
-    for (Index p = partner_start[body[k]]; p < partner_start[body[k] + 1]; ++p) {
-      if (may_be_near(position[k], site[k].range, skin, box[partner[p]])) return true;
-    }
-    return false;
-  }
-};
-
-/// What the search for entries reads.
-struct Near {
-  LayerView layer;
-  HashView hash;
-  const ContactCandidate* points;
-  double reach;
-
-  /// Calls visit(k) for each candidate in the lists of a point.
-  template <class Visit>
-  __device__ void each(Index p, Visit&& visit) const {
-    const ContactCandidate& point = points[p];
-    hash.visit_near(0, point.now, reach, [&](std::uint32_t entry, const Vec3d&) {
-      const Index k = hash.index[entry];
-      const ContactCandidate& other = points[k];
-      if (!is_near(point, other, layer.skin)) return;
-      if (layer.partner_of(point.body, other.body) >= 0) visit(k);
-    });
-  }
-};
-
-struct RangeOf {
-  const ContactCandidate* points;
-  __device__ double operator()(std::int64_t p) const { return points[p].site.range; }
-};
-
-using Candidates = DeviceArray<ContactCandidate>;
-using Numbers = DeviceArray<Index>;
-
-/// Rows and their entries, in terms of candidates.
-struct Found {
-  DeviceArray<std::uint64_t> keys;  ///< Ascending: by point, then as lists are.
-  Numbers near;                     ///< Of each entry: its candidate.
-  Numbers row_of_entry;
-  DeviceArray<ContactRow> rows;  ///< Their points are numbers of candidates.
-};
-
-std::int64_t count_of(std::size_t size) { return static_cast<std::int64_t>(size); }
-
-template <class T>
-DeviceArray<T> cleared(std::size_t count) {
-  DeviceArray<T> array(count, name);
-  array.clear();
-  return array;
-}
-
-/// Entries of an array. @param numbers of these entries
-template <class T>
-DeviceArray<T> gathered(const DeviceArray<T>& values, const Numbers& numbers) {
-  DeviceArray<T> some(numbers.size(), name);
-  for_each("gather", count_of(numbers.size()),
-           [all = values.data(), some = some.data(),
-            numbers = numbers.data()] __device__(std::int64_t p) { some[p] = all[numbers[p]]; });
-  return some;
-}
-
-/// The candidates of this rank.
-Candidates candidates_of(const LayerView& layer, std::size_t count) {
-  DeviceArray<char> flags(count, name);
-  for_each("choose_candidates", count_of(count),
-           [layer, flags = flags.data()] __device__(std::int64_t k) {
-             flags[k] = layer.is_near_others(static_cast<Index>(k));
-           });
-  const Numbers chosen = flagged_numbers(flags);
-  Candidates some(chosen.size(), name);
-  for_each("make_candidates", count_of(chosen.size()),
-           [layer, chosen = chosen.data(), some = some.data()] __device__(std::int64_t c) {
-             const Index k = chosen[c];
-             ContactCandidate& made = some[c];
-             made.now = layer.position[k];
-             made.site = layer.site[k];
-             made.site.mobility = layer.gain[k] * made.site.mobility;
-             made.id = layer.id[k];
-             made.body = layer.body[k];
-             made.rank = layer.rank;
-             made.place = k;
-           });
-  return some;
-}
-
-/// The candidates in the order that lists have.
-Numbers in_list_order(const Candidates& points, std::size_t bodies) {
-  DeviceArray<std::uint64_t> list(points.size(), name);
-  Numbers by_list(points.size(), name);
-  for_each("list_candidates", count_of(points.size()),
-           [points = points.data(), list = list.data(),
-            by_list = by_list.data()] __device__(std::int64_t p) {
-             list[p] = static_cast<std::uint64_t>(points[p].body) * contact_threads +
-                       static_cast<std::uint64_t>(part_of_list(points[p]));
-             by_list[p] = static_cast<Index>(p);
-           });
-  if (points.size() > 0) sort_pairs(list, by_list, bits_below(contact_threads * bodies));
-  return by_list;
-}
-
-/// The entries of the lists of all candidates: the number of the point times the number of
-/// candidates, plus the place in `by_list` of the candidate near it; ascending.
-DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerView& layer,
-                                         const Numbers& by_list) {
-  const std::size_t n = points.size();
-  if (n == 0) return {};
-  DeviceArray<Vec3d> now(n, name);
-  Numbers order(n, name);
-  for_each("place_candidates", count_of(n),
-           [points = points.data(), now = now.data(), by_list = by_list.data(),
-            order = order.data()] __device__(std::int64_t p) {
-             now[p] = points[p].now;
-             order[by_list[p]] = static_cast<Index>(p);
-           });
-  const thrust::transform_iterator ranges(thrust::counting_iterator<std::int64_t>(0),
-                                          RangeOf{points.data()});
-  const double reach = reduce(ranges, count_of(n), 0.0, Larger{}) + layer.skin;
-  const DeviceHash hash(now, {{0, static_cast<Index>(n), reach}});
-  const Near near{layer, hash.view(), points.data(), reach};
-  DeviceArray<Offset> count(n, name);
-  for_each("count_entries", count_of(n), [near, count = count.data()] __device__(std::int64_t p) {
-    Offset own = 0;
-    near.each(static_cast<Index>(p), [&](Index) { ++own; });
-    count[p] = own;
-  });
-  const DeviceArray<Offset> start = running_sums(count);
-  DeviceArray<std::uint64_t> keys(static_cast<std::size_t>(last_of(start)), name);
-  for_each("find_entries", count_of(n),
-           [near, start = start.data(), order = order.data(), keys = keys.data(),
-            n] __device__(std::int64_t p) {
-             Offset next = start[p];
-             near.each(static_cast<Index>(p), [&](Index k) {
-               keys[next++] =
-                   static_cast<std::uint64_t>(p) * n + static_cast<std::uint64_t>(order[k]);
-             });
-           });
-  if (keys.size() > 0) sort_values(keys, bits_below(n * n));
-  return keys;
-}
-
-/// Where entries are and whether rows begin there.
-struct Entries {
-  DeviceArray<std::uint64_t> keys;
-  Numbers near;    ///< Their candidates.
-  Numbers begins;  ///< 1 at the first entry of a row, else 0.
-};
-
-/// Entries in rows by points and bodies, and by patches if they have some.
-Entries entries_of(DeviceArray<std::uint64_t> keys, const Candidates& points,
-                   const Numbers& by_list, const Numbers& patch) {
-  const std::size_t entries = keys.size();
-  Entries found{std::move(keys), {entries, name}, {entries, name}};
-  for_each("begin_rows", count_of(entries),
-           [keys = found.keys.data(), near = found.near.data(), begins = found.begins.data(),
-            points = points.data(), by_list = by_list.data(), patch = patch.data(),
-            n = points.size()] __device__(std::int64_t e) {
-             const Index k = by_list[keys[e] % n];
-             near[e] = k;
-             begins[e] = e == 0 || keys[e - 1] / n != keys[e] / n ||
-                         points[by_list[keys[e - 1] % n]].body != points[k].body ||
-                         (patch && patch[e - 1] != patch[e]);
-           });
-  return found;
-}
-
-/// Sorts the entries of each point and body by the patches of the surface, and returns these.
-Numbers sort_by_patches(Entries& entries, const Candidates& points) {
-  const std::size_t count = entries.keys.size();
-  const Numbers sums = running_sums(entries.begins);
-  const auto rows = static_cast<std::size_t>(last_of(sums));
-  Numbers row(count, name), patch(count, name);
-  for_each("number_rows", count_of(count),
-           [sums = sums.data(), row = row.data()] __device__(std::int64_t e) {
-             row[e] = sums[e + 1] - 1;
-           });
-  const DeviceArray<Offset> start = starts_of<Offset>(row, rows, name);
-  for_each("find_patches", count_of(rows),
-           [start = start.data(), near = entries.near.data(), patch = patch.data(),
-            points = points.data()] __device__(std::int64_t r) {
-             const Offset first = start[r];
-             find_patches(
-                 static_cast<Index>(start[r + 1] - first),
-                 [&](Index k) -> const SurfaceSite& { return points[near[first + k]].site; },
-                 [&](Index k) -> Index& { return patch[first + k]; });
-           });
-  const auto most = static_cast<std::uint64_t>(reduce(patch.data(), count_of(count), 0, Larger{}));
-  if (most == 0) return {};
-  DeviceArray<std::uint64_t> order(count, name);
-  Numbers sorted(count, name);
-  for_each("order_patches", count_of(count),
-           [row = row.data(), patch = patch.data(), order = order.data(), sorted = sorted.data(),
-            most] __device__(std::int64_t e) {
-             order[e] = static_cast<std::uint64_t>(row[e]) * (most + 1) +
-                        static_cast<std::uint64_t>(patch[e]);
-             sorted[e] = static_cast<Index>(e);
-           });
-  sort_pairs(order, sorted, bits_below(rows * (most + 1)));
-  entries.keys = gathered(entries.keys, sorted);
-  return gathered(patch, sorted);
-}
-
-/// The rows of entries.
-Found rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
-              const Numbers& by_list) {
-  const std::size_t n = points.size(), count = keys.size();
-  Found found;
-  Entries entries = entries_of(std::move(keys), points, by_list, {});
-  Numbers patch;
-  if (count > 0) patch = sort_by_patches(entries, points);
-  if (patch.size() > 0) entries = entries_of(std::move(entries.keys), points, by_list, patch);
-  const Numbers sums = running_sums(entries.begins);
-  found.near = std::move(entries.near);
-  found.row_of_entry = {count, name};
-  found.rows = {static_cast<std::size_t>(last_of(sums)), name};
-  for_each("make_rows", count_of(count),
-           [layer, keys = entries.keys.data(), near = found.near.data(),
-            begins = entries.begins.data(), patch = patch.data(), sums = sums.data(),
-            points = points.data(), row_of_entry = found.row_of_entry.data(),
-            rows = found.rows.data(), n] __device__(std::int64_t e) {
-             const Index row = sums[e + 1] - 1;
-             row_of_entry[e] = row;
-             if (!begins[e]) return;
-             const auto p = static_cast<Index>(keys[e] / n);
-             const Index body = points[near[e]].body;
-             rows[row] = row_of(points[p], p, body, patch ? patch[e] : 0,
-                                layer.law[layer.partner_of(points[p].body, body)]);
-           });
-  found.keys = std::move(entries.keys);
-  return found;
-}
-
 /// Flags of the candidates of a rank that are in rows.
-DeviceArray<char> in_rows(const Found& found, const Candidates& points, int rank) {
+DeviceArray<char> in_rows(const FoundRows& found, const Candidates& points, int rank) {
   auto flags = cleared<char>(points.size());
   for_each("flag_points", count_of(found.near.size()),
            [points = points.data(), near = found.near.data(), row = found.row_of_entry.data(),
@@ -297,7 +44,7 @@ DeviceArray<char> in_rows(const Found& found, const Candidates& points, int rank
 
 /// Adds the points of rows that have a flagged one to those. @returns flags of the entries of these
 /// rows
-DeviceArray<char> spread(const Found& found, const DeviceArray<char>& flags) {
+DeviceArray<char> spread(const FoundRows& found, const DeviceArray<char>& flags) {
   const std::int64_t entries = count_of(found.near.size());
   const auto touched = cleared<char>(found.rows.size());
   for_each("touch_rows", entries,
@@ -362,7 +109,7 @@ Numbers number_points(const Candidates& points, const Numbers& own, const Number
   return number;
 }
 
-void set_lists(const Candidates& points, const Numbers& number, Found found,
+void set_lists(const Candidates& points, const Numbers& number, FoundRows found,
                DeviceTouchingPoints::Lists& lists) {
   const std::size_t entries = found.near.size(), rows = found.rows.size();
   Numbers list(entries, name), list_of_point(entries, name);
@@ -493,7 +240,7 @@ void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt) {
   Candidates points = candidates_of(layer, position.size());
   if (model.share) points = sent(of_all_ranks(model, fetched(points)), name);
   const Numbers by_list = in_list_order(points, reach_.boxes.size());
-  Found found = rows_of(entries_among(points, layer, by_list), points, layer, by_list);
+  FoundRows found = rows_of(entries_among(points, layer, by_list), points, layer, by_list);
   any_ = found.rows.size() > 0;
   const DeviceArray<char> chosen = in_rows(found, points, rank);
   if (model.share) {  // as of `phyxel::TouchingPoints`
