@@ -300,7 +300,11 @@ void add_warnings(Model& model, std::size_t surfels) {
   if (!model.degenerate.none()) {
     model.warnings.push_back(model.degenerate.describe() +
                              "; such phyxels resist only in the directions their neighbours span. "
-                             "A larger neighbours.factor, or support = \"adaptive\", helps");
+                             "A larger neighbours.factor, or support = \"adaptive\", helps" +
+                             (model.body_contact.acts()
+                                  ? "; other bodies may pass through where they are in one layer: "
+                                    "two across and more touch others"
+                                  : ""));
   }
   if (model.surfels.unreached > 0) {
     model.warnings.push_back(

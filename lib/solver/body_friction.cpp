@@ -37,11 +37,12 @@ void BodyPenalty::find_rubbing(SlipMeasure measure) {
   for (std::size_t r = 0; r < rubbing_.size(); ++r) {
     const ContactRow& row = points_.rows()[r];
     const bool touches = gap_[r] < reach * points_.sites()[row.point].range;
-    if (!touches_[r].is_inside || !record_.rubs(key(r), touches) || !(row.law.static_friction > 0))
-      continue;
+    if (!touches_[r].is_inside || !(row.law.static_friction > 0)) continue;
+    const double push = push_at(r, gap_[r]);
+    if (!record_.rubs(key(r), touches, push)) continue;
     rubbing_[r].normal = touches_[r].normal;
     rubbing_[r].slip = slip(r, moved);
-    record_.set_friction(key(r), row.law, push_at(r, gap_[r]), stiffness_[r], measure,
+    record_.set_friction(key(r), row.law, push, stiffness_[r], measure,
                          ahead.empty() ? Vec3d{} : slip(r, ahead), rubbing_[r]);
   }
   record_.end_linearise();

@@ -84,14 +84,14 @@ void ContactPenalty::find_rubbing(const PlacedObstacles& at, const Vector& u,
       Rubbing found;
       found.phyxel = k;
       found.obstacle = o;
-      if (!record_.rubs(found.key(), true)) return;
+      const double push = std::max(0.0, -stiffness_[k] * gap.distance);
+      if (!record_.rubs(found.key(), true, push)) return;
       found.normal = gap.normal;
       found.surface = slip.from[i] + at[o].dt * surface_velocity(at[o], x);
       found.slip = along(gap.normal, u[i] - found.surface);
       const Vec3d ahead =
           slip.starts_moving() ? along(gap.normal, slip.ahead[i] - found.surface) : Vec3d{};
-      record_.set_friction(found.key(), obstacle.law, std::max(0.0, -stiffness_[k] * gap.distance),
-                           stiffness_[k], slip, ahead, found);
+      record_.set_friction(found.key(), obstacle.law, push, stiffness_[k], slip, ahead, found);
       rubbing_.push_back(found);
     };
     layer.for_each_inside(obstacle, at[o], add, reach * largest_support_);

@@ -87,8 +87,15 @@ class RubbingRecord {
     const auto at = seen_.find(key);
     return at != seen_.end() ? at->second.held : 0;
   }
-  /// True if a contact rubs: of held normal forces, also where nothing presses any more.
-  bool rubs(Key key, bool touches) const { return holds_ ? held(key) > 0 : touches; }
+  /// True if a contact rubs: of held normal forces, also where nothing presses any more. What
+  /// presses without one is noted, and rubs from the next renewal on.
+  /// @param push normal force [N]
+  bool rubs(Key key, bool touches, double push) {
+    if (!holds_) return touches;
+    if (held(key) > 0) return true;
+    if (push > 0) seen_[key].push = push;
+    return false;
+  }
   void begin_linearise() {
     for (auto& [key, contact] : seen_) contact.push = 0;
   }

@@ -201,7 +201,7 @@ PHYXEL_HD double doubt_of_place(double square, double range) {
 
 /// Where a place beside a deformed surface is at rest, and its gap.
 struct PlaceAtRest {
-  double weights = 0;  ///< Σ w, before it is made 1; the rest is known above `least_weight`.
+  double weights = 0;  ///< Of all near phyxels; the rest is known above `least_weight`.
   Vec3<double> place;  ///< X(q) [m]
   Gap gap;             ///< Its normal may be shorter than 1, where walls have none in common.
 };
@@ -216,11 +216,11 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
                                     const PlacedDistances& field) {
   PlaceAtRest found;
   const Vec3<double> q = point.after + point.probe;
-  const auto weight_of = [&](Offset k) {
+  const auto nearness_of = [&](Offset k) {
     const Vec3<double> apart = motion_of(k).after - point.after;
-    return facing(point, motion_of(k)) *
-           surface_weight(dot(apart, apart), common_range(site.range, site_of(k).range));
+    return surface_weight(dot(apart, apart), common_range(site.range, site_of(k).range));
   };
+  const auto weight_of = [&](Offset k) { return facing(point, motion_of(k)) * nearness_of(k); };
   Mat3<double> back{};                  // Σ w G
   Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
   double level = 0, weights = 0;        // Σ w φ(X), Σ w
@@ -232,6 +232,7 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
     if (!(w > 0)) return;
     const Vec3<double> way = q - other.after;
     weights += w;
+    found.weights += nearness_of(k);
     back += w * other.back;
     rest += w * site_of(k).rest;
     const Vec3<double> whole = other.back * way, at = site_of(k).rest - site.rest + whole;
@@ -241,8 +242,9 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
     apart += w * way;
     level += w * site_of(k).level;
   });
-  found.weights = weights = threads.sum(weights);
-  if (!(weights > least_weight)) return found;
+  weights = threads.sum(weights);
+  found.weights = threads.sum(found.weights);
+  if (!(weights > 0 && found.weights > least_weight)) return found;
   const double scale = 1 / weights;
   back = scale * threads.sum(back);
   found.place = scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
