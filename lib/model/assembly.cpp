@@ -17,11 +17,8 @@
 #include "tabulated.hpp"
 
 namespace phyxel {
-namespace {
 
-constexpr double degree = std::numbers::pi / 180;
-
-}  // namespace
+static constexpr double degree = std::numbers::pi / 180;
 
 Motion motion_along(const MotionRequest& request) {
   return {.phyxels = {},
@@ -298,13 +295,11 @@ void find_moments(Model& model) {
 
 void add_warnings(Model& model, std::size_t surfels) {
   if (!model.degenerate.none()) {
+    const char* more = model.body_contact.acts() ? "; bodies may pass single layers" : "";
     model.warnings.push_back(model.degenerate.describe() +
                              "; such phyxels resist only in the directions their neighbours span. "
                              "A larger neighbours.factor, or support = \"adaptive\", helps" +
-                             (model.body_contact.acts()
-                                  ? "; other bodies may pass through where they are in one layer: "
-                                    "two across and more touch others"
-                                  : ""));
+                             more);
   }
   if (model.surfels.unreached > 0) {
     model.warnings.push_back(
