@@ -22,6 +22,9 @@ Vec3d BodyPenalty::slip(std::size_t r, const std::vector<Vec3d>& moved) const {
 }
 
 void BodyPenalty::find_rubbing(SlipMeasure measure) {
+  rubbing_.assign(touches_.size(), {});
+  slip_from_.assign(start_.size(), {});
+  if (!(measure.share > 0)) return;  // it is not known how far points have slipped
   measure.share *= softness;
   slip_share_ = measure.share;
   slip_from_ = of_points(measure.from);
@@ -31,7 +34,6 @@ void BodyPenalty::find_rubbing(SlipMeasure measure) {
     ahead = of_points(measure.ahead);
     for (std::size_t p = 0; p < ahead.size(); ++p) ahead[p] = ahead[p] - slip_from_[p];
   }
-  rubbing_.assign(touches_.size(), {});
   record_.begin_linearise();
   const double reach = record_.reach(measure);
   for (std::size_t r = 0; r < rubbing_.size(); ++r) {

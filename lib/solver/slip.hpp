@@ -20,7 +20,8 @@ inline constexpr double held_reach = 0.1;
 struct SlipMeasure {
   /// Displacements at the start of the stage [m], shape [n]; empty in scenes without friction.
   std::vector<Vec3d> from;
-  /// Slip at which friction is whole, over the depth at which the penalty is the normal force.
+  /// Slip at which friction is whole, over the depth at which the penalty is the normal force; 0
+  /// where slips are not known, and friction is none.
   double share = 0;
   /// Displacements that the velocities before a stage of an implicit step lead to at its end [m],
   /// from which a search starts; empty if all points are at rest before it.

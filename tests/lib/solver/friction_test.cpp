@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "phyxel/error.hpp"
+#include "phyxel/reactions.hpp"
 #include "support/contact_scene.hpp"
 
 namespace phyxel {
@@ -175,11 +176,15 @@ TEST(FrictionAtRest, HoldsABlockOnAnotherOne) {
               body("lower", shape + "spacing = 0.05\n", "[[body.fixed]]\nregion = 'z-'\n", 1e6) +
               body("upper", shape + "spacing = 0.04\ntranslation = [0, 0, 0.2]\n", "", 1e6),
           1);
+  // Before the search slips are not known, and a reading gives what it can.
+  ASSERT_EQ(find_reactions(way.model, *way.backend, way.solver).size(), 1u);
   way.solver.step();
   const std::vector<ContactReading> contacts = way.contacts();
   const Vec3d weight = 8.0 * way.model.gravity;
   EXPECT_LE(norm(contacts[1].force + weight), 1e-6 * norm(weight));
   EXPECT_LE(norm(contacts[0].force + contacts[1].force), 1e-12 * norm(weight));
+  const std::vector<Reaction> reactions = find_reactions(way.model, *way.backend, way.solver);
+  EXPECT_LE(norm(reactions[0].force + way.mass() * way.model.gravity), 1e-6 * norm(weight));
 }
 
 TEST(FrictionAtRest, OfPlatesShearsABlock) {
