@@ -39,7 +39,7 @@ void* allocate(std::size_t bytes, const std::string& what);
 void release(void* data, bool pooled);
 }  // namespace detail
 
-/// While one exists, the arrays that its thread makes lie in a pool that keeps what is freed: for
+/// A scope whose device arrays of this thread lie in a memory pool, which keeps freed memory: for
 /// work that makes many arrays again and again. Such an array must not be used by streams that do
 /// not synchronise with CUDA's default stream, nor by other processes.
 class PooledMemory {

@@ -8,7 +8,7 @@ namespace {
 
 constexpr const char* name = contact_arrays;
 
-/// What the search for entries reads.
+/// The input of the search for entries.
 struct Near {
   LayerView layer;
   HashView hash;
@@ -36,7 +36,7 @@ struct RangeOf {
   __device__ double operator()(std::int64_t p) const { return points[p].site.range; }
 };
 
-/// Where entries are and whether rows begin there.
+/// Entries, and flags of the first entry of each row.
 struct Entries {
   DeviceArray<std::uint64_t> keys;
   Numbers near;    ///< Their candidates.

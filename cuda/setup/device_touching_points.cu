@@ -42,7 +42,7 @@ DeviceArray<char> in_rows(const FoundRows& found, const Candidates& points, int 
   return flags;
 }
 
-/// Adds the points of rows that have a flagged one to those. @returns flags of the entries of these
+/// Flags all points of the rows that have a flagged point. @returns flags of the entries of these
 /// rows
 DeviceArray<char> spread(const FoundRows& found, const DeviceArray<char>& flags) {
   const std::int64_t entries = count_of(found.near.size());
@@ -63,7 +63,7 @@ DeviceArray<char> spread(const FoundRows& found, const DeviceArray<char>& flags)
   return of_entry;
 }
 
-/// Flags of the chosen candidates that a rank steps, or of the others.
+/// Flags of the chosen candidates that a rank steps, or that other ranks step.
 DeviceArray<char> flags_of(const DeviceArray<char>& chosen, const Candidates& points, int rank,
                            bool own) {
   DeviceArray<char> flags(points.size(), name);

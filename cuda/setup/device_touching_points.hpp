@@ -11,8 +11,8 @@
 
 namespace phyxel::cuda {
 
-/// The points and lists of `phyxel::TouchingPoints`, equal to those, in device memory. Only bodies'
-/// boxes, and with ranks the candidates, are known to the host.
+/// The points and lists of `phyxel::TouchingPoints` in device memory, with the same bits. The host
+/// has only the boxes of bodies and, with ranks, the candidates.
 class DeviceTouchingPoints {
  public:
   /// The points of this device, which come first, shape [count] each.
@@ -20,8 +20,8 @@ class DeviceTouchingPoints {
     DeviceArray<Index> layer;  ///< Numbers in the layer.
     DeviceArray<Index> place;  ///< Tile slots.
     DeviceArray<Index> tiles;  ///< The tiles of these slots, ascending, each once; shape [tiles].
-    /// Where a point is in these tiles: the number of its tile in `tiles` times the size of a tile,
-    /// and its place in the tile.
+    /// Slots in the listed tiles: the number of a tile in `tiles` times its size, plus the slot in
+    /// it.
     DeviceArray<Index> entry;
     DeviceArray<Index> body;      ///< Numbers of their bodies.
     DeviceArray<Vec3d> position;  ///< At rest [m].
@@ -40,7 +40,7 @@ class DeviceTouchingPoints {
   /// @param tiles number of tiles
   DeviceTouchingPoints(const SurfaceLayer& layer, const std::vector<Index>& place, Index tiles);
 
-  /// Finds them anew from places [m], shape [layer]. Of a share: collective.
+  /// Finds the points anew from places [m], shape [layer]. Of a share: collective.
   /// @param dt size of the step [s]
   void find(const DeviceArray<Vec3d>& position, double dt);
 
@@ -48,7 +48,7 @@ class DeviceTouchingPoints {
   const Lists& lists() const { return lists_; }
   /// True if there are rows on any rank.
   bool any() const { return any_; }
-  /// Where bodies were when points were found.
+  /// The extents of bodies when points were found.
   const BodyReach& reach() const { return reach_; }
 
   /// As of `phyxel::TouchingPoints`. Of a share: collective.

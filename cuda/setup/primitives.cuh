@@ -46,7 +46,8 @@ inline int bits_below(std::uint64_t end) {
   return std::max(1, static_cast<int>(std::bit_width(end - (end > 0))));
 }
 
-/// Stable sort of pairs by key, in place. @param bits all others of the keys are zero
+/// Stable sort of pairs by key, in place. @param bits number of low bits of the keys to compare;
+/// higher bits are zero
 template <class Key, class Value>
 void sort_pairs(DeviceArray<Key>& keys, DeviceArray<Value>& values, int bits = 8 * sizeof(Key)) {
   const auto count = static_cast<std::int64_t>(keys.size());

@@ -28,7 +28,7 @@ class TouchingPoints {
 
   /// As of `SurfaceLayer` [m].
   double skin() const { return layer_.skin(); }
-  /// Where bodies were when points were found.
+  /// The extents of bodies when points were found.
   const BodyReach& reach() const { return reach_; }
 
   /// Numbers, in the layer, of this rank's points.

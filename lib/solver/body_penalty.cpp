@@ -99,7 +99,7 @@ void BodyPenalty::linearise(const Vector& u, const SlipMeasure& slip,
   if (knows_expected_) expected_ = gaps(u);
   find_points(u);
   const std::size_t points = points_.sites().size(), rows = points_.rows().size();
-  held_reach_ = slip.rests && renewals_++ < 6 ? rounding_reach : 0;
+  stiff_reach_ = slip.rests && renewals_++ < 6 ? rounding_reach : 0;
   motion_.assign(points, {});
   for (std::size_t p = 0; p < count(); ++p) {
     const Index i = phyxel(p);
@@ -266,7 +266,7 @@ void BodyPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
 
 bool BodyPenalty::is_held(std::size_t r) const {
   const double range = points_.sites()[points_.rows()[r].point].range;
-  return touches_[r].is_inside && gap_[r] < held_reach_ * range;
+  return touches_[r].is_inside && gap_[r] < stiff_reach_ * range;
 }
 
 void BodyPenalty::find_blocks() {

@@ -34,7 +34,7 @@ class BodyPenalty {
   /// @param u displacements [m]. @param slip what slip is; not used without friction
   /// @param gradient of displacement, shape [n, 3, 3]
   void linearise(const Vector& u, const SlipMeasure& slip, const std::vector<Mat3d>& gradient);
-  /// Moves what `linearise` has found to displacements u, with gaps by their linear form.
+  /// Moves the points to displacements u, with gaps by the linear form of the last `linearise`.
   void move_to(const Vector& u, const SlipMeasure& slip);
   /// The farthest way of a point from its place at `linearise` to displacements u, as a share of
   /// the largest one up to which normals are kept. Of this rank's points.
@@ -148,7 +148,7 @@ class BodyPenalty {
   std::vector<Vec3d> found_at_;          // places of the layer when points were found [m]
   std::vector<Vec3d> shaped_at_;         // places of own points when normals were found [m]
   std::vector<Vec3d> start_;             // displacements of the points to which gaps belong [m]
-  std::vector<Vec3d> renewed_at_;        // those at `linearise` [m]
+  std::vector<Vec3d> renewed_at_;        // displacements of the points at `linearise` [m]
   std::vector<SurfaceMotion> motion_;    // shape [points]
   std::vector<SurfaceTouch> touches_;    // shape [rows], as all others of rows
   std::vector<SurfaceShare> carries_;    // shape [entries]
@@ -165,7 +165,7 @@ class BodyPenalty {
   std::vector<Vec3d> slip_from_;         // displacements of all points as the stage starts [m]
   std::vector<RubbingContact> rubbing_;  // shape [rows]
   int renewals_ = 0;                     // in the search
-  double held_reach_ = 0;                // gap of points with stiffness, as a share of ranges
+  double stiff_reach_ = 0;               // gap of points with stiffness, as a share of ranges
   /// The way as a share of ranges from which on normals are found anew. They jump where a point
   /// passes an edge: it grows in a search, so that it comes to an end.
   double far_ = 0.01;

@@ -46,10 +46,10 @@ class ContactPenalty {
   bool empty() const { return model_.obstacles.empty() && bodies_.empty(); }
   /// True if something has friction.
   bool rubs() const { return obstacles_rub_ || bodies_.rubs(); }
-  /// True if contact has what a search may keep over some steps (`Renewal`).
-  bool can_keep() const { return rubs() || !bodies_.empty(); }
-  /// True if what was found at the last renewal of all may be kept at displacements u. Collective
-  /// on a share.
+  /// True if there are gaps whose linear form a search may keep over some steps (`Renewal`).
+  bool can_keep() const { return !bodies_.empty(); }
+  /// True if points have moved so little to displacements u since the last renewal of all that the
+  /// linear form of gaps may be kept. Collective on a share.
   bool may_keep(const Vector& u) const;
   /// True if friction is that of normal forces that are held.
   bool holds_normals() const { return record_.holds(); }

@@ -60,9 +60,9 @@ PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& ot
          !is_within(other.site.rest - point.site.rest, ranges_apart * range);
 }
 
-/// Numbers the patches of a body's surface that are near a point: phyxels of two limbs, which are
-/// far from each other at rest, lead to no place between these. What is connected at rest by ways
-/// of `ranges_apart` ranges is one patch; patches are in the order of their first phyxels.
+/// Numbers the patches of a body's surface near a point. Phyxels are of one patch if a chain of
+/// them, each within `ranges_apart` ranges of the next at rest, connects them: two limbs that come
+/// near a point are two patches. Patches are in the order of their first phyxels.
 /// @param count number of phyxels. @param site_of returns that of a phyxel. @param patch_of returns
 /// a reference to the number of its patch, which is set. @returns the number of patches
 template <class SiteOf, class PatchOf>

@@ -23,7 +23,7 @@ constexpr int most_exhausted = 3;        // steps in a row whose linear equation
 constexpr int most_without_gain = 50;    // steps that hardly reduce the smallest residual
 constexpr double rounding_share = 1e-6;  // times the tolerance: a few units of rounding
 
-// What is kept of contact from step to step (`Renewal`).
+// Limits of the linear form of gaps (`Renewal`), and of held normal forces.
 constexpr double kept_below = 1e-2;       // residual
 constexpr int most_kept = 5;              // steps
 constexpr double share_of_goal = 0.1;     // of the last residual, from which on contact is renewed
@@ -86,7 +86,7 @@ void Newton::hold_normals(const Balance& balance, Rounds& rounds, const NewtonRe
 }
 
 /// Renews the normal forces of friction where a balance with held ones is found.
-/// @returns false if it is a balance with those that it leads to
+/// @returns false if the present normal forces are the held ones, within a tolerance
 bool Newton::renew_normals(const Balance& balance, Rounds& rounds) {
   const double most = balance.weight.empty() ? unrest_at_rest : unrest_in_steps;
   if (!contact_.holds_normals() || contact_.unrest() <= most) return false;
@@ -96,20 +96,23 @@ bool Newton::renew_normals(const Balance& balance, Rounds& rounds) {
   return true;
 }
 
-/// Takes stock where all of contact is found anew. @returns true if the search has ended
+/// Checks for convergence after a renewal of all of contact. @returns true if the search has ended
 bool Newton::takes_stock(const Balance& balance, const Vector& u, const Vector& force,
                          double tolerance, bool is_placed, Vector& all, Rounds& rounds,
                          NewtonReport& report) {
   report.residual = residual(balance, u, all);
   report.evaluations = evaluations_;
   report.found = report.residual <= tolerance && is_placed;
+  rounds.renewed = report.residual;
   if (report.found) {
     const bool begins = contact_.begin_sliding();
     if (!begins && !renew_normals(balance, rounds)) return true;
-    if (!begins) all = with_contact(balance, u, force);
+    if (!begins) {
+      all = with_contact(balance, u, force);
+      rounds.renewed = residual(balance, u, all);
+    }
     rounds.smallest = std::numeric_limits<double>::infinity();
   }
-  rounds.renewed = residual(balance, u, all);
   const bool gained = !is_placed || rounds.renewed < 0.9 * rounds.smallest;
   rounds.smallest = std::min(rounds.smallest, rounds.renewed);
   rounds.without_gain = gained ? 0 : rounds.without_gain + 1;
@@ -120,7 +123,7 @@ bool Newton::takes_stock(const Balance& balance, const Vector& u, const Vector& 
   return false;
 }
 
-/// True if contact has to be found anew after steps that have kept it.
+/// True if gaps of bodies have to be renewed after steps that have kept their linear form.
 bool Newton::must_renew(const Rounds& rounds, const Balance& balance, const Vector& u,
                         const Vector& all, double tolerance) const {
   const double goal = std::max(0.5 * tolerance, share_of_goal * rounds.renewed);

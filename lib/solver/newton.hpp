@@ -54,8 +54,8 @@ struct NewtonReport {
 /// gradients with differences of the backend's forces, so that all terms are included and no matrix
 /// is assembled. A step is shortened if it would strain the body too much or raise the energy.
 ///
-/// Near a balance, a search keeps what its stiffness does not know of contact (`Renewal`) until the
-/// residual has fallen by a part, and then renews it; normal forces of friction are held until a
+/// Near a balance, a search keeps the linear form of the gaps between bodies (`Renewal`) until the
+/// residual has fallen to a tenth, and then renews them; normal forces of friction are held until a
 /// balance is found with them.
 class Newton {
  public:
@@ -86,7 +86,7 @@ class Newton {
   void set_applied(double time, Balance& balance) const;
 
  private:
-  /// How far a search has come, and what it keeps of contact.
+  /// Progress of a search, and the state of its contact.
   struct Rounds {
     Renewal renewal = Renewal::all;  ///< Of the next look at contact.
     double renewed = 0;              ///< Residual when all of contact was found last.
@@ -106,8 +106,8 @@ class Newton {
                    bool is_placed, Vector& all, Rounds& rounds, NewtonReport& report);
   bool must_renew(const Rounds& rounds, const Balance& balance, const Vector& u, const Vector& all,
                   double tolerance) const;
-  /// Where a step starts: its balance, the energy and the residual there, and whether prescribed
-  /// phyxels move.
+  /// Start of a line search: the balance, its energy and residual, and true if prescribed phyxels
+  /// move.
   struct Start {
     const Balance& balance;
     double energy, residual;

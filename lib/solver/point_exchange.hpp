@@ -1,4 +1,4 @@
-/// The exchange of what ranks know of points that may touch.
+/// The halo exchange of values of points that may touch.
 #pragma once
 
 #include <unordered_map>

@@ -33,9 +33,9 @@ struct SlipMeasure {
   bool starts_moving() const { return !ahead.empty(); }
 };
 
-/// What a search by Newton's method finds anew of contact before a step. Forces of friction depend
-/// on normal forces, and gaps of bodies on gradients of displacement, in ways that their stiffness
-/// does not know: while both are kept, steps lead to a balance fast.
+/// Update of contact before a step of Newton's method: of all, or of the motion of points alone,
+/// with gaps between bodies by their linear form. Gaps depend on deformation gradients in ways that
+/// the stiffness does not contain: while their linear form is kept, Newton's method converges fast.
 enum class Renewal { all, motion };
 
 /// A contact that rubs, as it was at the last `linearise`.
@@ -61,8 +61,8 @@ struct RubbingContact {
 /// search ends if the search finds it sliding: in an implicit step as it first touches, with the
 /// velocity before the stage, and where forces balance with the static one.
 ///
-/// Friction has an energy only while normal forces do not change: a search renews them now and then
-/// (`Renewal`).
+/// Friction has an energy only while normal forces do not change: a search may hold them, and
+/// renews them where it has found a balance.
 class RubbingRecord {
  public:
   /// A point, and what it touches.
@@ -84,12 +84,13 @@ class RubbingRecord {
     }
     holds_ = true;
   }
+  /// The held normal force of a contact [N]; 0 if it has none.
   double held(Key key) const {
     const auto at = seen_.find(key);
     return at != seen_.end() ? at->second.held : 0;
   }
-  /// True if a contact rubs: of held normal forces, also where nothing presses any more. What
-  /// presses without one is noted, and rubs from the next renewal on.
+  /// True if a contact rubs. While normal forces are held, a contact with one rubs even where it
+  /// has opened; a contact without one that presses is noted, and rubs from the next renewal on.
   /// @param push normal force [N]
   bool rubs(Key key, bool touches, double push) {
     if (!holds_) return touches;
@@ -97,6 +98,7 @@ class RubbingRecord {
     if (push > 0) seen_[key].push = push;
     return false;
   }
+  /// Forgets the present normal forces, which `rubs` and `set_friction` note anew.
   void begin_linearise() {
     for (auto& [key, contact] : seen_) contact.push = 0;
   }

@@ -11,7 +11,7 @@
 
 namespace phyxel {
 
-/// Where bodies are, as all ranks know it.
+/// The extent of each body of the scene and its neighbours, equal on all ranks.
 struct BodyReach {
   /// The box of the layer's phyxels of each body of the scene, grown by their ranges.
   std::vector<Box> boxes;
@@ -29,14 +29,13 @@ class SurfaceLayer {
   const Model& model() const { return model_; }
   /// The phyxels of the layer, ascending.
   const std::vector<Index>& phyxels() const { return model_.body_contact.layer.phyxels; }
-  /// What does not change of each; its mobility is 1 along free axes and 0 along others.
+  /// Constants of each phyxel; the mobility is 1 along free axes and 0 along prescribed ones.
   const std::vector<SurfaceSite>& sites() const { return sites_; }
   /// The body that each belongs to.
   const std::vector<Index>& bodies() const { return bodies_; }
   /// Groups of the layer, in its order.
   const std::vector<LayerGroup>& groups() const { return groups_; }
-  /// Twice the distance by which phyxels may move before those that may touch have to be found
-  /// anew [m].
+  /// The skin [m]: contact lists stay valid until a phyxel has moved by half of it.
   double skin() const { return skin_; }
 
   /// The change of velocity of each by a force over a step of `dt` [s], along free axes [m/s/N].
@@ -48,7 +47,7 @@ class SurfaceLayer {
 
   /// The box of a group, grown by the ranges of its phyxels. @param position shape [phyxels] [m]
   Box box_of(const LayerGroup& group, std::span<const Vec3d> position) const;
-  /// Where bodies are. Of a share: collective. @param boxes of the groups (`box_of`)
+  /// The extents of bodies. Of a share: collective. @param boxes of the groups (`box_of`)
   BodyReach reach_of(std::span<const Box> boxes) const;
   /// The same from places [m], shape [phyxels].
   BodyReach reach_at(std::span<const Vec3d> position) const;

@@ -180,26 +180,26 @@ PHYXEL_HD Gap deformed_gap(const Gap& gap, double level, const Mat3<double>& bac
   return {(gap.distance - level) / length, (1 / length) * m};
 }
 
-/// What is added to the gap of a point that no phyxel of a surface is near, as a share of its
-/// range. A surface that is touched has phyxels within half a range, of weight 0.4; gradients of
-/// phyxels at the rim of the range say little of the place of a point.
+/// The correction of the gap of a point far from all phyxels of a surface, as a share of its range.
+/// A surface that is touched has phyxels within half a range, of weight 0.4; gradients of phyxels
+/// at the rim of the range say little of the place of a point.
 /// @param weights Σ w
 PHYXEL_HD double distance_of_lone_point(double weights) {
   constexpr double enough = 0.4, most = 0.3;
   return weights < enough ? most * (1 - weights / enough) : 0;
 }
 
-/// How much the places at rest to which phyxels of a surface lead a point disagree: not at all
-/// where they are within a quarter of a range, entirely from half a range on. So they do in the
-/// crease of a folded limb, whose two walls lead to places far apart, with the inside of the body
-/// between them.
+/// The weight of single gaps over the gap of the mean place, from the spread of the places at rest
+/// to which phyxels of a surface lead a point: 0 up to a quarter of a range, 1 from half a range
+/// on. The spread is large in the crease of a folded limb, whose two walls lead to places far
+/// apart, with the inside of the body between them.
 /// @param square of their spread [m²]
 PHYXEL_HD double doubt_of_place(double square, double range) {
   const double t = 4 * std::sqrt(square > 0 ? square : 0.0) / range - 1;
   return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
 }
 
-/// Where a place beside a deformed surface is at rest, and its gap.
+/// The place at rest of a place beside a deformed surface, and its gap.
 struct PlaceAtRest {
   double weights = 0;  ///< Of all near phyxels; the rest is known above `least_weight`.
   Vec3<double> place;  ///< X(q) [m]

@@ -25,12 +25,12 @@ struct FrictionLimit {
   double width() const { return stiffness > 0 ? 2 * force / stiffness : 0; }
 };
 
-/// What a slip y is divided by where it gives the direction of friction, f₁ s/y = s/η, and η'.
+/// The scale η of a slip s of size y, by which friction has the direction s/η = f₁ s/y, and η'.
 struct SlipScale {
   double length = 0;  ///< η [m]; y where friction is whole.
   double slope = 1;   ///< η' [1]
 };
-/// What a slip is divided by. @param y its size [m]. @param width ε [m]
+/// The scale of a slip. @param y its size [m]. @param width ε [m]
 inline SlipScale slip_scale(double y, double width) {
   if (!(y < width)) return {y, 1};
   const double length = width / (2 - y / width);
