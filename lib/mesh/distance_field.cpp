@@ -102,15 +102,20 @@ std::size_t DistanceArrays::bytes() const {
   return brick.size() * sizeof(std::int32_t) + (coarse.size() + fine.size()) * sizeof(float);
 }
 
-DistanceArrays distances_from(const Surface& surface, double spacing, double band,
+DistanceArrays distances_from(const Surface& surface, double spacing, double band, double margin,
                               double most_nodes) {
   const Box box = box_around(surface.position);
   const double area = area_of(surface);
   const auto extent = [&](double h) {
-    const double margin = band + h;
-    return box.high - box.low + 2.0 * Vec3d{margin, margin, margin};
+    const double beside = std::max(margin, std::max(band, 2 * h) + h);
+    return box.high - box.low + 2.0 * Vec3d{beside, beside, beside};
   };
   while (node_count(extent(spacing), area, spacing, band) > most_nodes) spacing *= 1.25;
+  // Nodes lie just outside the faces of the box around the surface, whose edges are then hardly
+  // rounded: those of a cube all do. What lies below an edge has the face's distances and normal.
+  constexpr double outside = 0.05;  // cells
+  const double longest = box.extent();
+  if (longest > spacing) spacing = longest / (std::ceil(longest / spacing) - 2 * outside);
   band = std::max(band, 2 * spacing);
 
   DistanceArrays made;
@@ -119,10 +124,14 @@ DistanceArrays distances_from(const Surface& surface, double spacing, double ban
   const auto cells = [&](double length) {
     return std::max(1, static_cast<int>(std::ceil(length / cell)));
   };
-  const Vec3d size = extent(spacing);
+  const double beside =
+      spacing *
+      (std::ceil(0.5 * (extent(spacing).x - (box.high.x - box.low.x)) / spacing) + outside);
+  const Vec3d margins{beside, beside, beside}, size = box.high - box.low + 2.0 * margins;
   shape.spacing = spacing;
-  shape.margin = band + spacing;
-  shape.low = box.low - Vec3d{shape.margin, shape.margin, shape.margin};
+  shape.box_low = box.low;
+  shape.box_high = box.high;
+  shape.low = box.low - margins;
   shape.count = {cells(size.x), cells(size.y), cells(size.z)};
   const Vec3<int> n = shape.count;
   const auto place = [&](std::int64_t k, Vec3<int> count, double offset) {

@@ -33,7 +33,8 @@ inline constexpr double most_field_nodes = 1e8;
 /// the same bits on any number of threads.
 /// @param spacing of nodes near the surface [m]; it grows if there would be more than `most_nodes`
 /// @param band distance from the surface up to which nodes are that near to each other [m]
+/// @param margin least distance from the surface up to which points are in the grid [m]
 DistanceArrays distances_from(const Surface& surface, double spacing, double band,
-                              double most_nodes = most_field_nodes);
+                              double margin = 0, double most_nodes = most_field_nodes);
 
 }  // namespace phyxel

@@ -73,8 +73,9 @@ LayerSupports supports_of_layer(const Model& model, Index body) {
 }
 
 /// The distances from a body's surface, as finely as its phyxels are spaced.
+/// @param largest support of a phyxel of any body's surface [m]
 std::shared_ptr<const DistanceArrays> distances_of(const BodyRequest& request, Surface surface,
-                                                   const LayerSupports& supports) {
+                                                   const LayerSupports& supports, double largest) {
   const SurfaceDefects defects = inspect_surface(surface);
   if (!connect(surface).closed) {
     throw InputError(named(
@@ -83,8 +84,12 @@ std::shared_ptr<const DistanceArrays> distances_of(const BodyRequest& request, S
                              request.name, defects.describe())));
   }
   orient(surface);
+  // Distances are asked for half a spacing from points that touch; far coarser bodies must not make
+  // the grid too large.
+  constexpr double of_support = 0.5, most = 8;
+  const double margin = std::min(of_support * largest, most * supports.most);
   return std::make_shared<const DistanceArrays>(
-      distances_from(surface, nodes_over_support * supports.least, supports.most));
+      distances_from(surface, nodes_over_support * supports.least, supports.most, margin));
 }
 
 /// The box of the phyxels of a body's surface at rest, with a margin.
@@ -236,10 +241,12 @@ void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSu
     if (o == originals.size()) originals.push_back({b, std::move(surface), supports[b]});
     original_of[b] = o;
   }
+  double largest = 0;
+  for (const LayerSupports& s : supports) largest = std::max(largest, s.most);
   std::vector<std::shared_ptr<const DistanceArrays>> made;
   for (Original& original : originals) {
-    made.push_back(
-        distances_of(scene.bodies[original.body], std::move(original.surface), original.supports));
+    made.push_back(distances_of(scene.bodies[original.body], std::move(original.surface),
+                                original.supports, largest));
   }
   for (std::size_t b = 0; b < supports.size(); ++b) {
     if (supports[b].most > 0) distances[b].arrays = made[original_of[b]];

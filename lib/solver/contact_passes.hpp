@@ -90,7 +90,7 @@ struct ContactPasses {
                      (threads.sum(mobility) + share[here.point] * site[here.point].mobility);
     found.target = target_velocity(touch[r], relative_velocity(threads, r),
                                    motion[here.point].earlier - threads.sum(earlier), here.law,
-                                   site[here.point].range, dt);
+                                   depth_recovery(site[here.point], dt), dt);
     if (threads.is_first()) response[r] = found;
   }
   template <class Threads>

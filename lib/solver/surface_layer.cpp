@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "mesh/distance_field.hpp"
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/parts.hpp"
+#include "phyxel/diagnostics.hpp"
 #include "phyxel/law_table.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "rank_exchange.hpp"
@@ -19,20 +21,52 @@ namespace {
 
 constexpr double share_of_range = 0.25;  // of the skin
 
-/// Sets where a phyxel's distance from other bodies is looked up, and the level of its surface,
-/// from the distances of places around it from its own body's surface.
+/// How a body's surface falls away beside a place.
+struct FallingAway {
+  double mean = 0;  ///< Over a way and its opposite, the largest one.
+  double most = 0;  ///< The largest one.
+};
+
+/// Finds the sine of the angle by which a body's surface falls away, as it does from edges and
+/// corners. @param normal of the surface there. @param spacing of phyxels [m]
+FallingAway falling_away(const PlacedDistances& own, Vec3d place, Vec3d normal, double spacing) {
+  const double along_x = dot(normal, own.turn * Vec3d{1, 0, 0});
+  const Vec3d axis = own.turn * (std::abs(along_x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
+  const Vec3d a = cross(normal, axis) / norm(cross(normal, axis)), b = cross(normal, a);
+  const double here = own.gap(place).distance;
+  FallingAway found;
+  constexpr int ways = 8;  // in half a circle
+  for (int k = 0; k < ways; ++k) {
+    const double angle = k * std::numbers::pi / ways;
+    const Vec3d way = spacing * (std::cos(angle) * a + std::sin(angle) * b);
+    const double one = (own.gap(place + way).distance - here) / spacing,
+                 other = (own.gap(place - way).distance - here) / spacing;
+    found.mean = std::max(found.mean, 0.5 * (one + other));
+    found.most = std::max({found.most, one, other});
+  }
+  return found;
+}
+
+/// Sets where a phyxel's distance from other bodies is looked up, the level of its surface, and
+/// whether that has an edge there, from the distances of places around it from its own body's
+/// surface.
 void look_around(SurfaceSite& site, const PlacedDistances& own) {
   const double spacing = 0.45 * site.range;
-  const auto slope = [&](Vec3d way) {
-    return (own.gap(site.rest + spacing * way).distance -
-            own.gap(site.rest - spacing * way).distance) /
-           (2 * spacing);
+  // Along axes that turn with the body, so that copies find the same.
+  const auto slope = [&](Vec3d axis) {
+    const Vec3d way = spacing * (own.turn * axis);
+    return (own.gap(site.rest + way).distance - own.gap(site.rest - way).distance) / (2 * spacing);
   };
-  const Vec3d normal{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})};
+  const Vec3d normal = own.turn * Vec3d{slope({1, 0, 0}), slope({0, 1, 0}), slope({0, 0, 1})};
   const double size = norm(normal);
   if (!(size > 0.1)) return;                             // a body so thin that it has no inside
   constexpr double share_of_spacing = 0.5, flat = 0.95;  // at an edge of a box, the size is 0.71
-  site.inward = (-share_of_spacing * spacing / size) * normal;
+  const Vec3d out = normal / size;
+  site.inward = -share_of_spacing * spacing * out;
+  const FallingAway falls = falling_away(own, site.rest, out, spacing);
+  constexpr double least = 0.25, most = 0.82;  // 0.71 at edges of a box, 0.82 at its corners
+  const double sine = std::min(falls.most, most);
+  if (falls.mean > least) site.tip = site.offset / std::sqrt(1 - sine * sine);
   if (site.offset == 0 && size > flat) site.level = own.gap(site.rest).distance;
 }
 
@@ -57,7 +91,8 @@ SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
                      .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
                      .area = model.volume[i] / range,
                      .offset = model.body_contact.layer.offset[k],
-                     .range = range};
+                     .range = range,
+                     .wave_speed = pressure_wave_speed(part_of(model, i).material)};
     look_around(site, model.body_contact.distances[bodies_[k]].view());
     return site;
   });

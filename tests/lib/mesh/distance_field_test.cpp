@@ -103,6 +103,36 @@ TEST(DistanceFields, AreLowerBoundsFarAway) {
   }
 }
 
+TEST(DistanceFields, AreExactAboveFlatFacesHoweverFarAway) {
+  // A cell is 0.4 wide, so that the grid reaches farther beyond some faces than beyond others.
+  const DistanceArrays made = distances_from(box({-1, -0.9, -0.8}, {1, 0.9, 0.8}), 0.05, 0.1);
+  for (const double away : {0.1, 0.3, 0.7, 1.0, 3.0}) {
+    EXPECT_NEAR(made.view().gap({0.2, 0.3, 0.8 + away}).distance, away, 1e-6);
+    EXPECT_NEAR(made.view().gap({0.2, -0.9 - away, 0.1}).distance, away, 1e-6);
+    EXPECT_NEAR(made.view().gap({1 + away, 0.3, 0.1}).distance, away, 1e-6);
+  }
+}
+
+TEST(DistanceFields, HaveTheMarginAskedFor) {
+  // Beside the middle of an edge of the box around a ball it is far from the ball.
+  const Surface ball = sphere({}, 1, 3);
+  const Vec3d x{1.4, 1.4, 0};
+  EXPECT_LT(distances_from(ball, 0.05, 0.1).view().gap(x).distance, 0.7);
+  EXPECT_NEAR(distances_from(ball, 0.05, 0.1, 0.8).view().gap(x).distance, norm(x) - 1, 0.03);
+}
+
+TEST(DistanceFields, HardlyRoundEdgesOfACube) {
+  const DistanceArrays made = distances_from(box({-1, -1, -1}, {1, 1, 1}), 0.13, 0.2);
+  const DistanceField field = made.view();
+  const double edge = std::sqrt(0.5);
+  // An edge in the middle of a cell is off by a fifth of a cell.
+  EXPECT_LT(field.gap({1, 1, 0.3}).distance, 0.1 * 0.13);
+  EXPECT_LT(field.gap({-1, -1, -1}).distance, 0.1 * 0.13);
+  // Right below an edge the nearest place is on the face.
+  EXPECT_LT(norm(field.gap({1, 0.2, 1.06}).normal - Vec3d{0, 0, 1}), 0.02);
+  EXPECT_LT(norm(field.gap({1.06, 0.2, 1.06}).normal - Vec3d{edge, 0, edge}), 0.3);
+}
+
 TEST(DistanceFields, KnowTheirDeepestPlace) {
   const DistanceArrays made = distances_from(box({2, 0, 0}, {4, 1, 6}), 0.05, 0.1);
   EXPECT_NEAR(made.depth, 0.5, 0.05);
@@ -126,7 +156,7 @@ TEST(DistanceFields, HaveTheSameBitsOnAnyThreads) {
 
 TEST(DistanceFields, AreCoarserThanAskedIfTheyWereTooLarge) {
   const Surface surface = sphere({}, 1, 2);
-  const DistanceArrays made = distances_from(surface, 1e-3, 2e-3, 1e6);
+  const DistanceArrays made = distances_from(surface, 1e-3, 2e-3, 0, 1e6);
   EXPECT_GT(made.shape.spacing, 1e-3);
   EXPECT_LE(static_cast<double>(made.fine.size() + made.coarse.size()), 1e6);
   EXPECT_NEAR(made.view().gap({1.01, 0, 0}).distance, 0.01, 0.005);

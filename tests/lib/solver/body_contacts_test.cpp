@@ -129,7 +129,7 @@ TEST(BodyContacts, LetEqualBarsExchangeTheirVelocities) {
   const double start = way.energy(), speed_of_sound = 10;
   const double duration = time_of_contact(way, 1, 0.09);
   // Goldsmith 1960: 2 L/c. 4 across, the outermost half layer is a part of the length.
-  EXPECT_NEAR(duration / (2 * 2 / speed_of_sound), 1, 0.03);
+  EXPECT_NEAR(duration / (2 * 2 / speed_of_sound), 1, 0.035);
   EXPECT_NEAR(velocity_of(way, 0).x, 0, 0.003);
   EXPECT_NEAR(velocity_of(way, 1).x, 0.1, 0.003);
   // The layers that meet lose what an inelastic impact of half a layer does.
@@ -205,7 +205,7 @@ TEST(BodyContacts, PassPressureOnBetweenLatticesThatDoNotMatch) {
     volume += v;
   }
   const double mean = sum / volume;
-  EXPECT_NEAR(mean, -0.01, 5e-5);
+  EXPECT_NEAR(mean, -0.01, 1e-4);  // they sink by a thousandth of a spacing
   // At the corners, which lie on each other, it is a quarter off.
   EXPECT_LE(std::sqrt(squares / volume - mean * mean), 0.03 * std::abs(mean));
   EXPECT_NEAR(way.contacts()[1].force.z / (1e5 * 0.16 * mean), 1, 0.01);
@@ -339,10 +339,10 @@ TEST(BodyContacts, OfBodiesAtRestAreFoundWhenAnObstacleSetsThemInMotion) {
 }
 
 TEST(BodyContacts, MakeLittleEnergyWhereAFineCornerHitsACoarseEdge) {
-  const auto made = [](double step) {
+  const auto made = [](const std::string& place, double step) {
     Way way(end + touching +
                 body("fine", "shape = 'block'\nsize = [0.03, 0.03, 0.03]\nspacing = 0.006\n",
-                     "translation = [0.06, 0.055, 0.07]\nvelocity = [0, 0, -0.5]\n") +
+                     "translation = " + place + "\nvelocity = [0, 0, -0.5]\n") +
                 body("coarse", "shape = 'block'\nsize = [0.1, 0.1, 0.1]\nspacing = 0.02\n", ""),
             step);
     const double start = way.energy();
@@ -350,9 +350,63 @@ TEST(BodyContacts, MakeLittleEnergyWhereAFineCornerHitsACoarseEdge) {
     EXPECT_GT(norm(way.contacts()[0].impulse), 1e-3);
     return -energy_lost(way.contacts()) / start;
   };
-  // It was 54%, and grew as the step shrank, before depth was made good slowly.
-  EXPECT_LT(made(2e-4), 0.1);
-  EXPECT_LT(made(5e-5), 0.05);
+  // Where it lies with a corner on the coarse one's corner, it was 54%, and half of its weight was
+  // lost in sideways impulses, while the coarse corner did not act.
+  for (const std::string place : {"[0.06, 0.055, 0.07]", "[0.062, 0.062, 0.07]",
+                                  "[0.052, 0.048, 0.066]", "[0.06, 0, 0.07]"}) {
+    EXPECT_LT(made(place, 2e-4), 0.04) << place;
+    EXPECT_LT(made(place, 2.5e-5), 0.04) << place;  // it must not grow as steps shrink
+  }
+}
+
+/// How deep the lowest place of a coarse cube on a corner or an edge goes into a finer plate that
+/// is held [m], and the speed at which the cube is thrown back over the one with which it has come.
+struct Landing {
+  double depth = 0, rebound = 0;
+};
+Landing landing_of(const std::string& rotation, double height, const std::string& lattice,
+                   double spacing) {
+  const std::string of_lattice = "lattice = '" + lattice + "'\n";
+  Way way(
+      end + touching +
+          body("plate",
+               fmt::format("shape = 'block'\nsize = [0.3, 0.3, 0.1]\nspacing = {}\n", spacing),
+               of_lattice + "translation = [0.003, 0.004, -0.05]\n[[body.fixed]]\nall = true\n") +
+          body("cube", "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\n",
+               of_lattice + "rotation = " + rotation +
+                   fmt::format("\ntranslation = [0, 0, {}]\nvelocity = [0, 0, -0.1]\n",
+                               height + 1e-3)),
+      5e-4);
+  Landing found;
+  const Part& cube = way.model.parts[1];
+  for (int step = 0; step < 400 && velocity_of(way, 1).z < 0.09; ++step) {
+    way.solver.step();
+    SurfelState surface;
+    way.backend->advect_surfels(surface);
+    for (Index s = cube.surfel_begin; s < cube.surfel_end; ++s) {
+      found.depth = std::max(found.depth, -surface.position[s].z);
+    }
+  }
+  found.rebound = velocity_of(way, 1).z / 0.1;
+  return found;
+}
+
+TEST(BodyContacts, KeepACoarseCornerOutOfAFineSurface) {
+  // It sank by half of its spacing: fine points did not meet it, and it had none that acted.
+  for (const double spacing : {0.05, 0.03, 0.017}) {
+    const std::string corner = "[38.68, -38.68, 0]", edge = "[45, 0, 0]";
+    const Landing on_corner = landing_of(corner, 0.1 * std::sqrt(3), "nodes", spacing);
+    const Landing on_edge = landing_of(edge, 0.1 * std::sqrt(2), "nodes", spacing);
+    EXPECT_LT(on_corner.depth, 0.1 * 0.05) << spacing;
+    EXPECT_LT(on_edge.depth, 0.02 * 0.05) << spacing;
+    // The rest of the energy stays in vibrations of the cube, however fine the plate is.
+    EXPECT_NEAR(on_corner.rebound, 0.738, 0.005) << spacing;
+    EXPECT_GT(on_edge.rebound, 0.85) << spacing;
+    // In cells the outermost phyxels are half a spacing inside.
+    EXPECT_LT(landing_of(corner, 0.1 * std::sqrt(3), "cells", spacing).depth, 0.1 * 0.05)
+        << spacing;
+    EXPECT_LT(landing_of(edge, 0.1 * std::sqrt(2), "cells", spacing).depth, 0.1 * 0.05) << spacing;
+  }
 }
 
 TEST(BodyContacts, WithoutFrictionBrakeNothingOnCoarsePoints) {

@@ -94,6 +94,8 @@ TEST(Copies, ActAsBodiesWithFieldsOfTheirOwn) {
   ASSERT_EQ(own.arrays, model.body_contact.distances[0].arrays);
   DistanceArrays moved = *own.arrays;
   moved.shape.low += own.place;
+  moved.shape.box_low += own.place;
+  moved.shape.box_high += own.place;
   own = {std::make_shared<const DistanceArrays>(std::move(moved)), identity<double>(), {}};
   const auto backend = testing::make_test_backend(model, Precision::double_, 1);
   Solver solver(model, *backend, initial_state(model, shared.scene, dt), Method::verlet);

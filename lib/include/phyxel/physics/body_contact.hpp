@@ -35,7 +35,12 @@ struct SurfaceSite {
   double level = 0;
   double area = 0;    ///< A measure of the area of its part of the surface [m²].
   double offset = 0;  ///< Its distance from its body's surface [m].
-  double range = 0;   ///< Distance up to which it knows of other surfaces [m].
+  /// That from its body's edge or corner there, along its normal [m]; negative if there is none.
+  double tip = -1;
+  double range = 0;       ///< Distance up to which it knows of other surfaces [m].
+  double wave_speed = 0;  ///< Of pressure waves in its body [m/s].
+
+  PHYXEL_HD bool is_edge() const { return tip >= 0; }
 };
 
 /// The motion of a phyxel of a contact layer over a step, before contact.
@@ -72,6 +77,14 @@ PHYXEL_HD double common_range(double a, double b) { return a > b ? a : b; }
 PHYXEL_HD double facing(const SurfaceMotion& point, const SurfaceMotion& other) {
   const double t = 2.5 * (0.1 - dot(point.out, other.out));
   return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
+}
+
+/// How far a phyxel beside a surface is from it along a normal of another body [m]: at an edge that
+/// is pressed into that body, as far as from the edge.
+/// @param normal away from the other body. @param out as of `SurfaceMotion`
+PHYXEL_HD double offset_along(Vec3<double> normal, Vec3<double> out, const SurfaceSite& site) {
+  const double from_edge = -dot(normal, out) * site.tip;
+  return from_edge > site.offset ? from_edge : site.offset;
 }
 
 /// Sets the probe, the inverse deformation gradient and the normal of a phyxel.
@@ -303,7 +316,8 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   constexpr double shortest = 0.3;  // opposite walls have no common normal
   if (!(length > shortest)) return touch;
   touch.normal = (1 / length) * rest.gap.normal;
-  touch.gap = rest.gap.distance - dot(touch.normal, point.probe) - site.offset +
+  touch.gap = rest.gap.distance - dot(touch.normal, point.probe) -
+              offset_along(touch.normal, point.out, site) +
               distance_of_lone_point(rest.weights) * site.range;
   if (!(touch.gap < reach * site.range) ||
       dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
@@ -359,6 +373,23 @@ PHYXEL_HD double mobility_along(Vec3<double> mobility, Vec3<double> way) {
   return way.x * way.x * mobility.x + way.y * way.y * mobility.y + way.z * way.z * mobility.z;
 }
 
+/// How fast a point that is inside a body as a step starts is led out.
+struct DepthRecovery {
+  double rate = 0;         ///< Part of the depth by time [1/s].
+  double fastest = 1e300;  ///< Most depth by time [m/s].
+};
+
+/// A fifth of the depth in a step, up to a hundredth of the range, but in steps far below the
+/// stable one no more by time than in that, or what came upon it deep inside would be flung out,
+/// the faster the shorter steps are.
+PHYXEL_HD DepthRecovery depth_recovery(const SurfaceSite& site, double dt) {
+  constexpr double part = 0.2, most = 0.01;  // of a step
+  constexpr double stable = 0.5;             // steps are at most as many times range / wave speed
+  const double in_stable = site.wave_speed / (stable * site.range);  // [1/s]
+  const double rate = in_stable < 1 / dt ? in_stable : 1 / dt;
+  return {part * rate, most * site.range * rate};
+}
+
 /// The least velocity along n̄ with which a step shall end, so that it closes the gap and throws
 /// back what has come,
 ///
@@ -366,16 +397,15 @@ PHYXEL_HD double mobility_along(Vec3<double> mobility, Vec3<double> way) {
 ///
 /// where v is the velocity of the point relative to the surface before contact, v⁻ that at the
 /// start of the step, and e the restitution, which counts for points that approach. Where the point
-/// was inside as the step started, g⁻ < 0, a fifth of it is made good, up to a hundredth of a
-/// range, so that points that come upon each other deep inside, as at corners, are not flung apart.
-/// @param range of the point [m]
+/// was inside as the step started, g⁻ < 0, a part of it is made good, so that points that come upon
+/// each other deep inside, as at corners, are not flung apart.
+/// @param recovery of the point
 PHYXEL_HD double target_velocity(const SurfaceTouch& touch, Vec3<double> velocity,
-                                 Vec3<double> earlier, const ContactLaw& law, double range,
-                                 double dt) {
+                                 Vec3<double> earlier, const ContactLaw& law,
+                                 const DepthRecovery& recovery, double dt) {
   const double ahead = dot(touch.normal, velocity), before = touch.gap / dt - ahead;
-  constexpr double recovery = 0.2, most = 0.01;
-  const double fifth = -recovery * before, limit = most * range / dt;
-  const double closing = before >= 0 ? -before : fifth < limit ? fifth : limit;
+  const double out = -recovery.rate * dt * before;
+  const double closing = before >= 0 ? -before : out < recovery.fastest ? out : recovery.fastest;
   const double approach = -dot(touch.normal, earlier);
   if (!(law.restitution > 0 && approach > 0)) return closing;
   const double rebound = ahead + (1 + law.restitution) * approach;

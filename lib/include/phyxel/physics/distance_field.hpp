@@ -22,10 +22,10 @@ struct DistanceField {
   static constexpr int edge = 8;                                      ///< Fine cells along a brick.
   static constexpr int nodes = (edge + 1) * (edge + 1) * (edge + 1);  ///< Of a brick.
 
-  Vec3<double> low;    ///< The grid's lowest corner [m].
-  double spacing = 0;  ///< Of the fine nodes [m].
-  double margin = 0;   ///< The grid reaches so far beyond the surface [m].
-  Vec3<int> count{};   ///< Coarse cells along each axis.
+  Vec3<double> low;                ///< The grid's lowest corner [m].
+  double spacing = 0;              ///< Of the fine nodes [m].
+  Vec3<double> box_low, box_high;  ///< Corners of the box around the surface [m].
+  Vec3<int> count{};               ///< Coarse cells along each axis.
   /// Number of the brick in each coarse cell, -1 without one; x is fastest, as in all arrays here.
   const std::int32_t* brick = nullptr;
   const float* coarse = nullptr;  ///< Distances at the corners of coarse cells [m].
@@ -34,17 +34,19 @@ struct DistanceField {
   /// The distance of a point from the surface. Beyond the grid it is a lower bound.
   PHYXEL_HD Gap gap(Vec3<double> x) const {
     const double cell = edge * spacing;
-    const Vec3<double> from = x - low;
-    const auto clamped = [](double value, double most) {
-      return value < 0 ? 0.0 : value < most ? value : most;
+    const auto clamped = [](Vec3<double> v, Vec3<double> least, Vec3<double> most) {
+      const auto one = [](double value, double from, double to) {
+        return value < from ? from : value < to ? value : to;
+      };
+      return Vec3<double>{one(v.x, least.x, most.x), one(v.y, least.y, most.y),
+                          one(v.z, least.z, most.z)};
     };
-    const Vec3<double> within{clamped(from.x, cell * count.x), clamped(from.y, cell * count.y),
-                              clamped(from.z, cell * count.z)};
-    const Vec3<double> beyond = from - within;
-    const double square = dot(beyond, beyond);
-    if (square > 0) {
-      const double distance = std::sqrt(square);
-      return {distance + margin, (1 / distance) * beyond};
+    const Vec3<double> extent{cell * count.x, cell * count.y, cell * count.z};
+    const Vec3<double> within = clamped(x - low, {}, extent), beyond = x - low - within;
+    if (dot(beyond, beyond) > 0) {
+      const Vec3<double> away = x - clamped(x, box_low, box_high);
+      const double distance = std::sqrt(dot(away, away));
+      return {distance, (1 / distance) * away};
     }
     const auto cell_of = [](double value, double size, int cells) {
       const int k = static_cast<int>(value / size);
