@@ -113,9 +113,13 @@ DistanceArrays distances_from(const Surface& surface, double spacing, double ban
   while (node_count(extent(spacing), area, spacing, band) > most_nodes) spacing *= 1.25;
   // Nodes lie just outside the faces of the box around the surface, whose edges are then hardly
   // rounded: those of a cube all do. What lies below an edge has the face's distances and normal.
+  // The middle is not between two cells, so that the normal of a ridge there favours no side.
   constexpr double outside = 0.05;  // cells
   const double longest = box.extent();
-  if (longest > spacing) spacing = longest / (std::ceil(longest / spacing) - 2 * outside);
+  if (longest > spacing) {
+    const double across = std::ceil(longest / spacing);
+    spacing = longest / (across + (std::fmod(across, 2) == 0 ? 1 : 0) - 2 * outside);
+  }
   band = std::max(band, 2 * spacing);
 
   DistanceArrays made;

@@ -18,6 +18,7 @@
 #include "solver/contact_stiffness.hpp"
 #include "solver/first_error.hpp"
 #include "solver/following_loads.hpp"
+#include "solver/host_threads.hpp"
 #include "solver/hourglass.hpp"
 #include "solver/part_law.hpp"
 #include "solver/present_forces.hpp"
@@ -74,7 +75,7 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
     histories.emplace_back(state, part.material, columns);
     most_numbers = std::max(most_numbers, histories.back().size());
   }
-  const int threads = std::max(1, backend.threads());
+  const int threads = host_threads(backend);
   std::vector<std::vector<double>> rooms(static_cast<std::size_t>(threads),
                                          std::vector<double>(most_numbers));
   FirstError error;  // of a caller's law

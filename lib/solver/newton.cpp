@@ -9,6 +9,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/host_threads.hpp"
 
 namespace phyxel {
 namespace {
@@ -50,7 +51,7 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
     : model_(model),
       backend_(backend),
       most_steps_(most_steps),
-      vectors_(model, std::max(1, backend.threads())),
+      vectors_(model, host_threads(backend)),
       following_(model),
       contact_(model),
       difference_(1e-7 * vectors_.smallest_support()) {}

@@ -7,6 +7,7 @@
 #include "solver/body_contacts.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/contact_stiffness.hpp"
+#include "solver/host_threads.hpp"
 #include "solver/step_contacts.hpp"
 
 namespace phyxel {
@@ -39,8 +40,8 @@ State next_state(const Model& model, const SupportInstant& now, const State& sta
 
 NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
                    const State& state) {
-  StepContacts contacts(model, std::max(1, backend.threads()));
-  BodyContacts bodies(model, std::max(1, backend.threads()));
+  StepContacts contacts(model, host_threads(backend));
+  BodyContacts bodies(model, host_threads(backend));
   const std::vector<Index>& layer =
       bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
   State next = next_state(model, now, state, layer);

@@ -5,6 +5,7 @@
 #include "solver/body_contacts.hpp"
 #include "solver/contact_penalty.hpp"
 #include "solver/contact_stiffness.hpp"
+#include "solver/host_threads.hpp"
 
 namespace phyxel {
 namespace {
@@ -27,7 +28,7 @@ void add_obstacles(const Model& model, const State& state, double time, PresentC
 
 void add_bodies(const Model& model, Backend& backend, const State& state, double dt,
                 PresentContact& found) {
-  BodyContacts bodies(model, std::max(1, backend.threads()));
+  BodyContacts bodies(model, host_threads(backend));
   const auto get = [&](Index i) { return SurfaceState{state.displacement[i], state.velocity[i]}; };
   bodies.begin_step(dt, get);
   if (!bodies.any()) return;

@@ -11,6 +11,7 @@
 #include "phyxel/physics/verlet.hpp"
 #include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/host_threads.hpp"
 #include "solver/implicit_step.hpp"
 #include "solver/newton.hpp"
 #include "solver/step_sums.hpp"
@@ -125,7 +126,7 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
   model_ = &model;
   method_ = method;
   if (method == Method::equilibrium && start.step == 0) {
-    const OwnedVectors vectors(model, std::max(1, backend.threads()));
+    const OwnedVectors vectors(model, host_threads(backend));
     begun_ = vectors.largest([&](Index i) { return norm(start.displacement[i]); }) > 0;
   }
   if (method != Method::implicit) return;

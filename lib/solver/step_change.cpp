@@ -12,6 +12,7 @@
 #include "phyxel/solver.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/following_loads.hpp"
+#include "solver/host_threads.hpp"
 #include "solver/present_contact.hpp"
 #include "solver/present_forces.hpp"
 
@@ -32,7 +33,7 @@ class Accelerations {
       : model_(model),
         backend_(backend),
         time_(time),
-        owned_(model, std::max(1, backend.threads())),
+        owned_(model, host_threads(backend)),
         following_(model),
         free_(free_axes(model)) {}
 

@@ -10,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/contact_stiffness.hpp"
+#include "solver/host_threads.hpp"
 #include "solver/start_vector.hpp"
 #include "stage.hpp"
 
@@ -26,7 +27,7 @@ class HostVibration final : public Vibration {
   HostVibration(const Model& model, Backend& backend, const State& present, double distance)
       : model_(model),
         backend_(backend),
-        vectors_(model, std::max(1, backend.threads())),
+        vectors_(model, host_threads(backend)),
         present_(present),
         moved_(present),
         prescribed_(prescribed_axes(model)),
@@ -242,7 +243,7 @@ StepLimit step_limit(const Model& model, Backend& backend) {
 }
 
 StepLimit present_step_limit(const Model& model, Backend& backend) {
-  const OwnedVectors vectors(model, std::max(1, backend.threads()));
+  const OwnedVectors vectors(model, host_threads(backend));
   const double distance = strain_at_work * vectors.smallest_support();
   Frequency found;
   if (const std::unique_ptr<Vibration> on_device = backend.vibration_at_present(distance)) {

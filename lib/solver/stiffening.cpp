@@ -6,6 +6,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/host_threads.hpp"
 #include "solver/part_law.hpp"
 #include "solver/stiffest.hpp"
 
@@ -60,7 +61,7 @@ Stiffest stiffest_here(const Model& model, Backend& backend) {
   std::vector<Mat3d> gradient;
   backend.displacement_gradients(gradient);
   Stiffest all;
-#pragma omp parallel num_threads(std::max(1, backend.threads()))
+#pragma omp parallel num_threads(host_threads(backend))
   {
     Stiffest own;
     for (const Part& part : model.parts) {

@@ -21,35 +21,27 @@ namespace {
 
 constexpr double share_of_range = 0.25;  // of the skin
 
-/// How a body's surface falls away beside a place.
-struct FallingAway {
-  double mean = 0;  ///< Over a way and its opposite, the largest one.
-  double most = 0;  ///< The largest one.
-};
-
-/// Finds the sine of the angle by which a body's surface falls away, as it does from edges and
-/// corners. @param normal of the surface there. @param spacing of phyxels [m]
-FallingAway falling_away(const PlacedDistances& own, Vec3d place, Vec3d normal, double spacing) {
+/// The sine of the angle by which a body's surface falls away beside a place, as it does from edges
+/// and corners. @param normal of the surface there. @param spacing of phyxels [m]
+double fall_beside(const PlacedDistances& own, Vec3d place, Vec3d normal, double spacing) {
   const double along_x = dot(normal, own.turn * Vec3d{1, 0, 0});
   const Vec3d axis = own.turn * (std::abs(along_x) < 0.6 ? Vec3d{1, 0, 0} : Vec3d{0, 1, 0});
   const Vec3d a = cross(normal, axis) / norm(cross(normal, axis)), b = cross(normal, a);
   const double here = own.gap(place).distance;
-  FallingAway found;
+  double most = 0;
   constexpr int ways = 8;  // in half a circle
   for (int k = 0; k < ways; ++k) {
     const double angle = k * std::numbers::pi / ways;
     const Vec3d way = spacing * (std::cos(angle) * a + std::sin(angle) * b);
-    const double one = (own.gap(place + way).distance - here) / spacing,
-                 other = (own.gap(place - way).distance - here) / spacing;
-    found.mean = std::max(found.mean, 0.5 * (one + other));
-    found.most = std::max({found.most, one, other});
+    const double mean =
+        0.5 * (own.gap(place + way).distance + own.gap(place - way).distance) - here;
+    most = std::max(most, mean / spacing);
   }
-  return found;
+  return most;
 }
 
-/// Sets where a phyxel's distance from other bodies is looked up, the level of its surface, and
-/// whether that has an edge there, from the distances of places around it from its own body's
-/// surface.
+/// Sets where a phyxel's distance from other bodies is looked up and, of one that lies on its
+/// body's surface, the level of that and how it falls away, from the distances of places around it.
 void look_around(SurfaceSite& site, const PlacedDistances& own) {
   const double spacing = 0.45 * site.range;
   // Along axes that turn with the body, so that copies find the same.
@@ -63,11 +55,9 @@ void look_around(SurfaceSite& site, const PlacedDistances& own) {
   constexpr double share_of_spacing = 0.5, flat = 0.95;  // at an edge of a box, the size is 0.71
   const Vec3d out = normal / size;
   site.inward = -share_of_spacing * spacing * out;
-  const FallingAway falls = falling_away(own, site.rest, out, spacing);
-  constexpr double least = 0.25, most = 0.82;  // 0.71 at edges of a box, 0.82 at its corners
-  const double sine = std::min(falls.most, most);
-  if (falls.mean > least) site.tip = site.offset / std::sqrt(1 - sine * sine);
-  if (site.offset == 0 && size > flat) site.level = own.gap(site.rest).distance;
+  if (site.offset > 0) return;
+  site.fall = fall_beside(own, site.rest, out, spacing);
+  if (size > flat) site.level = own.gap(site.rest).distance;
 }
 
 /// The box around two boxes.
@@ -87,15 +77,17 @@ SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
   sites_ = tabulated(phyxels().size(), [&](std::size_t k) {
     const Index i = phyxels()[k];
     const double range = model.neighbourhood.support[i];
-    SurfaceSite site{.rest = model.position[i],
-                     .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
-                     .area = model.volume[i] / range,
-                     .offset = model.body_contact.layer.offset[k],
-                     .range = range,
-                     .wave_speed = pressure_wave_speed(part_of(model, i).material)};
-    look_around(site, model.body_contact.distances[bodies_[k]].view());
-    return site;
+    return SurfaceSite{.rest = model.position[i],
+                       .mobility = free.empty() ? Vec3d{1, 1, 1} : free[i],
+                       .area = model.volume[i] / range,
+                       .offset = model.body_contact.layer.offset[k],
+                       .range = range,
+                       .wave_speed = pressure_wave_speed(part_of(model, i).material)};
   });
+#pragma omp parallel for schedule(static)
+  for (std::size_t k = 0; k < sites_.size(); ++k) {
+    look_around(sites_[k], model.body_contact.distances[bodies_[k]].view());
+  }
   double least = HUGE_VAL;
   for (const SurfaceSite& site : sites_) least = std::min(least, site.range);
   groups_ = groups_of(model, model.body_contact.layer);

@@ -33,14 +33,15 @@ struct SurfaceSite {
   Vec3<double> inward;  ///< From X to the place at rest whose distance is looked up [m].
   /// φ(X) of its own body, where its surface is smooth: distances are taken from there [m].
   double level = 0;
-  double area = 0;    ///< A measure of the area of its part of the surface [m²].
-  double offset = 0;  ///< Its distance from its body's surface [m].
-  /// That from its body's edge or corner there, along its normal [m]; negative if there is none.
-  double tip = -1;
+  double area = 0;        ///< A measure of the area of its part of the surface [m²].
+  double offset = 0;      ///< Its distance from its body's surface [m].
   double range = 0;       ///< Distance up to which it knows of other surfaces [m].
   double wave_speed = 0;  ///< Of pressure waves in its body [m/s].
+  /// Sine of the angle by which its body's surface falls away there, if it lies on it.
+  double fall = 0;
 
-  PHYXEL_HD bool is_edge() const { return tip >= 0; }
+  /// True if its body's surface has an edge or a corner there: 0.7 at edges of a box.
+  PHYXEL_HD bool is_edge() const { return fall > 0.25; }
 };
 
 /// The motion of a phyxel of a contact layer over a step, before contact.
@@ -77,14 +78,6 @@ PHYXEL_HD double common_range(double a, double b) { return a > b ? a : b; }
 PHYXEL_HD double facing(const SurfaceMotion& point, const SurfaceMotion& other) {
   const double t = 2.5 * (0.1 - dot(point.out, other.out));
   return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
-}
-
-/// How far a phyxel beside a surface is from it along a normal of another body [m]: at an edge that
-/// is pressed into that body, as far as from the edge.
-/// @param normal away from the other body. @param out as of `SurfaceMotion`
-PHYXEL_HD double offset_along(Vec3<double> normal, Vec3<double> out, const SurfaceSite& site) {
-  const double from_edge = -dot(normal, out) * site.tip;
-  return from_edge > site.offset ? from_edge : site.offset;
 }
 
 /// Sets the probe, the inverse deformation gradient and the normal of a phyxel.
@@ -316,8 +309,7 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   constexpr double shortest = 0.3;  // opposite walls have no common normal
   if (!(length > shortest)) return touch;
   touch.normal = (1 / length) * rest.gap.normal;
-  touch.gap = rest.gap.distance - dot(touch.normal, point.probe) -
-              offset_along(touch.normal, point.out, site) +
+  touch.gap = rest.gap.distance - dot(touch.normal, point.probe) - site.offset +
               distance_of_lone_point(rest.weights) * site.range;
   if (!(touch.gap < reach * site.range) ||
       dot(touch.normal, point.out) > -0.2 * dot(point.out, point.out)) {
