@@ -88,6 +88,30 @@ class SignedDistances {
   WindingNumber tree_;
 };
 
+/// Lays the grid around a surface. The parameters are those of `distances_from`; the band grows to
+/// at least two cells.
+DistanceField grid_around(const Surface& surface, double spacing, double& band, double margin,
+                          double most_nodes) {
+  const Box box = box_around(surface.position);
+  const double area = area_of(surface);
+  const auto beside = [&](double h) { return std::max(margin, band + h); };
+  const auto extent = [&](double h) { return box.high - box.low + 2 * beside(h) * Vec3d{1, 1, 1}; };
+  while (node_count(extent(spacing), area, spacing, band) > most_nodes) spacing *= 1.25;
+  band = std::max(band, 2 * spacing);
+  const double cell = edge * spacing;
+  const auto cells = [&](double length) {
+    return std::max(1, static_cast<int>(std::ceil(length / cell)));
+  };
+  const Vec3d size = extent(spacing);
+  DistanceField shape;
+  shape.box_low = box.low;
+  shape.box_high = box.high;
+  shape.spacing = spacing;
+  shape.low = box.low - beside(spacing) * Vec3d{1, 1, 1};
+  shape.count = {cells(size.x), cells(size.y), cells(size.z)};
+  return shape;
+}
+
 }  // namespace
 
 DistanceField DistanceArrays::view() const {
@@ -104,39 +128,11 @@ std::size_t DistanceArrays::bytes() const {
 
 DistanceArrays distances_from(const Surface& surface, double spacing, double band, double margin,
                               double most_nodes) {
-  const Box box = box_around(surface.position);
-  const double area = area_of(surface);
-  const auto extent = [&](double h) {
-    const double beside = std::max(margin, std::max(band, 2 * h) + h);
-    return box.high - box.low + 2.0 * Vec3d{beside, beside, beside};
-  };
-  while (node_count(extent(spacing), area, spacing, band) > most_nodes) spacing *= 1.25;
-  // Nodes lie just outside the faces of the box around the surface, whose edges are then hardly
-  // rounded: those of a cube all do. What lies below an edge has the face's distances and normal.
-  // The middle is not between two cells, so that the normal of a ridge there favours no side.
-  constexpr double outside = 0.05;  // cells
-  const double longest = box.extent();
-  if (longest > spacing) {
-    const double across = std::ceil(longest / spacing);
-    spacing = longest / (across + (std::fmod(across, 2) == 0 ? 1 : 0) - 2 * outside);
-  }
-  band = std::max(band, 2 * spacing);
-
   DistanceArrays made;
-  DistanceField& shape = made.shape;
+  made.shape = grid_around(surface, spacing, band, margin, most_nodes);
+  const DistanceField& shape = made.shape;
+  spacing = shape.spacing;
   const double cell = edge * spacing;
-  const auto cells = [&](double length) {
-    return std::max(1, static_cast<int>(std::ceil(length / cell)));
-  };
-  const double beside =
-      spacing *
-      (std::ceil(0.5 * (extent(spacing).x - (box.high.x - box.low.x)) / spacing) + outside);
-  const Vec3d margins{beside, beside, beside}, size = box.high - box.low + 2.0 * margins;
-  shape.spacing = spacing;
-  shape.box_low = box.low;
-  shape.box_high = box.high;
-  shape.low = box.low - margins;
-  shape.count = {cells(size.x), cells(size.y), cells(size.z)};
   const Vec3<int> n = shape.count;
   const auto place = [&](std::int64_t k, Vec3<int> count, double offset) {
     return shape.low + cell * Vec3d{offset + static_cast<double>(k % count.x),

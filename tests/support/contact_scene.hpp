@@ -74,4 +74,23 @@ inline constexpr double dt = 5e-4;  // a tenth of the largest stable step withou
 inline const std::string end = "[time]\nend = 1\n";
 inline std::string obstacle(const std::string& keys) { return "[[obstacle]]\n" + keys; }
 
+/// What friction and impacts have taken from the bodies [J].
+inline double energy_lost(const std::vector<ContactReading>& contacts) {
+  double lost = 0;
+  for (const ContactReading& c : contacts) lost += c.friction_heat + c.impact_loss;
+  return lost;
+}
+
+/// The momentum of a body over its mass [m/s].
+inline Vec3d velocity_of(Way& way, std::size_t part) {
+  const State state = way.solver.state();
+  Vec3d sum;
+  double mass = 0;
+  for (Index i = way.model.parts[part].begin; i < way.model.parts[part].end; ++i) {
+    sum += way.model.mass[i] * state.velocity[i];
+    mass += way.model.mass[i];
+  }
+  return sum / mass;
+}
+
 }  // namespace phyxel

@@ -121,18 +121,6 @@ TEST(DistanceFields, HaveTheMarginAskedFor) {
   EXPECT_NEAR(distances_from(ball, 0.05, 0.1, 0.8).view().gap(x).distance, norm(x) - 1, 0.03);
 }
 
-TEST(DistanceFields, HardlyRoundEdgesOfACube) {
-  const DistanceArrays made = distances_from(box({-1, -1, -1}, {1, 1, 1}), 0.13, 0.2);
-  const DistanceField field = made.view();
-  const double edge = std::sqrt(0.5);
-  // An edge in the middle of a cell is off by a fifth of a cell.
-  EXPECT_LT(field.gap({1, 1, 0.3}).distance, 0.1 * 0.13);
-  EXPECT_LT(field.gap({-1, -1, -1}).distance, 0.1 * 0.13);
-  // Right below an edge the nearest place is on the face.
-  EXPECT_LT(norm(field.gap({1, 0.2, 1.06}).normal - Vec3d{0, 0, 1}), 0.02);
-  EXPECT_LT(norm(field.gap({1.06, 0.2, 1.06}).normal - Vec3d{edge, 0, edge}), 0.3);
-}
-
 TEST(DistanceFields, KnowTheirDeepestPlace) {
   const DistanceArrays made = distances_from(box({2, 0, 0}, {4, 1, 6}), 0.05, 0.1);
   EXPECT_NEAR(made.depth, 0.5, 0.05);

@@ -29,12 +29,6 @@ std::string meeting_balls(const std::string& contact) {
               "spin = [2, 0, 4]\n");
 }
 
-double energy_lost(const std::vector<ContactReading>& contacts) {
-  double lost = 0;
-  for (const ContactReading& c : contacts) lost += c.friction_heat + c.impact_loss;
-  return lost;
-}
-
 TEST(BodyContacts, KeepBothMomentaToRounding) {
   for (const Precision precision : {Precision::double_, Precision::mixed, Precision::single}) {
     for (const std::string more : {"", "restitution = 0.5\n", "sweeps = 3\n"}) {
@@ -99,18 +93,6 @@ std::string bars(double length, double other) {
          body("second", bar(other), "", 1e5, 0);
 }
 
-/// The momentum of a body over its mass [m/s].
-Vec3d velocity_of(Way& way, std::size_t part) {
-  const State state = way.solver.state();
-  Vec3d sum;
-  double mass = 0;
-  for (Index i = way.model.parts[part].begin; i < way.model.parts[part].end; ++i) {
-    sum += way.model.mass[i] * state.velocity[i];
-    mass += way.model.mass[i];
-  }
-  return sum / mass;
-}
-
 /// How long the second body is pushed along x, until it is faster than `speed` [m/s]; steps end
 /// `most` [s] after the start.
 double time_of_contact(Way& way, double most, double speed) {
@@ -129,7 +111,7 @@ TEST(BodyContacts, LetEqualBarsExchangeTheirVelocities) {
   const double start = way.energy(), speed_of_sound = 10;
   const double duration = time_of_contact(way, 1, 0.09);
   // Goldsmith 1960: 2 L/c. 4 across, the outermost half layer is a part of the length.
-  EXPECT_NEAR(duration / (2 * 2 / speed_of_sound), 1, 0.035);
+  EXPECT_NEAR(duration / (2 * 2 / speed_of_sound), 1, 0.03);
   EXPECT_NEAR(velocity_of(way, 0).x, 0, 0.003);
   EXPECT_NEAR(velocity_of(way, 1).x, 0.1, 0.003);
   // The layers that meet lose what an inelastic impact of half a layer does.
@@ -205,7 +187,7 @@ TEST(BodyContacts, PassPressureOnBetweenLatticesThatDoNotMatch) {
     volume += v;
   }
   const double mean = sum / volume;
-  EXPECT_NEAR(mean, -0.01, 1e-4);  // they sink by a thousandth of a spacing
+  EXPECT_NEAR(mean, -0.01, 5e-5);
   // At the corners, which lie on each other, it is a quarter off.
   EXPECT_LE(std::sqrt(squares / volume - mean * mean), 0.03 * std::abs(mean));
   EXPECT_NEAR(way.contacts()[1].force.z / (1e5 * 0.16 * mean), 1, 0.01);
@@ -336,122 +318,6 @@ TEST(BodyContacts, OfBodiesAtRestAreFoundWhenAnObstacleSetsThemInMotion) {
     return sum / (p.end - p.begin);
   };
   EXPECT_GT(place_of(1) - place_of(0), 0.09);  // they are 0.1 m wide, and swing
-}
-
-TEST(BodyContacts, MakeLittleEnergyWhereAFineCornerHitsACoarseEdge) {
-  const auto made = [](const std::string& place, double step) {
-    Way way(end + touching +
-                body("fine", "shape = 'block'\nsize = [0.03, 0.03, 0.03]\nspacing = 0.006\n",
-                     "translation = " + place + "\nvelocity = [0, 0, -0.5]\n") +
-                body("coarse", "shape = 'block'\nsize = [0.1, 0.1, 0.1]\nspacing = 0.02\n", ""),
-            step);
-    const double start = way.energy();
-    way.solver.step(std::llround(0.1 / step));
-    EXPECT_GT(norm(way.contacts()[0].impulse), 1e-3);
-    return -energy_lost(way.contacts()) / start;
-  };
-  // Where it lies with a corner on the coarse one's corner, it was 54%, and half of its weight was
-  // lost in sideways impulses, while the coarse corner did not act.
-  for (const std::string place : {"[0.06, 0.055, 0.07]", "[0.062, 0.062, 0.07]",
-                                  "[0.052, 0.048, 0.066]", "[0.06, 0, 0.07]"}) {
-    EXPECT_LT(made(place, 2e-4), 0.1) << place;
-    EXPECT_LT(made(place, 2.5e-5), 0.05) << place;  // it must not grow as steps shrink
-  }
-}
-
-/// How deep the lowest place of a coarse cube on a corner or an edge goes into a finer plate that
-/// is held [m], and the speed at which the cube is thrown back over the one with which it has come.
-struct Landing {
-  double depth = 0, rebound = 0;
-};
-Landing landing_of(const std::string& rotation, double height, double spacing) {
-  Way way(end + touching +
-              body("plate",
-                   fmt::format("shape = 'block'\nsize = [0.3, 0.3, 0.1]\nspacing = {}\n", spacing),
-                   "translation = [0.003, 0.004, -0.05]\n[[body.fixed]]\nall = true\n") +
-              body("cube", "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\n",
-                   "rotation = " + rotation +
-                       fmt::format("\ntranslation = [0, 0, {}]\nvelocity = [0, 0, -0.1]\n",
-                                   height + 1e-3)),
-          5e-4);
-  Landing found;
-  const Part& coarse = way.model.parts[1];
-  for (int step = 0; step < 400 && velocity_of(way, 1).z < 0.09; ++step) {
-    way.solver.step();
-    SurfelState surface;
-    way.backend->advect_surfels(surface);
-    for (Index s = coarse.surfel_begin; s < coarse.surfel_end; ++s) {
-      found.depth = std::max(found.depth, -surface.position[s].z);
-    }
-  }
-  found.rebound = velocity_of(way, 1).z / 0.1;
-  return found;
-}
-
-TEST(BodyContacts, KeepACoarseCornerOutOfAFineSurface) {
-  // It sank by half of its spacing: fine points did not meet it, and it had none that acted.
-  for (const double spacing : {0.05, 0.03, 0.017}) {
-    const std::string corner = "[38.68, -38.68, 0]", edge = "[45, 0, 0]";
-    const Landing on_corner = landing_of(corner, 0.1 * std::sqrt(3), spacing);
-    const Landing on_edge = landing_of(edge, 0.1 * std::sqrt(2), spacing);
-    EXPECT_LT(on_corner.depth, 0.1 * 0.05) << spacing;
-    EXPECT_LT(on_edge.depth, 0.02 * 0.05) << spacing;
-    // The rest of the energy stays in vibrations of the cube, however fine the plate is.
-    EXPECT_NEAR(on_corner.rebound, 0.738, 0.005) << spacing;
-    EXPECT_GT(on_edge.rebound, 0.85) << spacing;
-  }
-}
-
-TEST(BodyContacts, OfAMirroredSceneAreMirrored) {
-  // The lowest line of a cylinder in cells, and of its field of distances, is on the plane x = 0.
-  Way way("gravity = [0, 0, -9.81]\n" + end + touching +
-              body("plate", "shape = 'block'\nsize = [0.4, 0.4, 0.1]\nspacing = 0.05\n",
-                   "lattice = 'cells'\ntranslation = [0, 0, -0.05]\n[[body.fixed]]\nall = true\n") +
-              body("roll", "shape = 'cylinder'\nradius = 0.1\nlength = 0.2\nspacing = 0.05\n",
-                   "lattice = 'cells'\nrotation = [90, 0, 0]\ntranslation = [0, 0, 0.101]\n"
-                   "velocity = [0, 0, -0.5]\n"),
-          5e-4);
-  way.solver.step(200);
-  const Vec3d impulse = way.contacts()[1].impulse;
-  EXPECT_GT(impulse.z, 1);
-  // It was 0.18 where the nearest facet on one side gave the normal at the ridge.
-  EXPECT_LE(std::abs(impulse.x), 1e-9 * impulse.z);
-}
-
-/// How much of a fine block's momentum is lost as it flies past a coarse one, beside its face.
-double lost_beside(const std::string& lattice, double gap) {
-  const std::string of_lattice = "lattice = '" + lattice + "'\n";
-  Way way(end + touching +
-              body("coarse", "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\n",
-                   of_lattice, 1e7) +
-              body("fine", "shape = 'block'\nsize = [0.1, 0.1, 0.1]\nspacing = 0.0166\n",
-                   of_lattice + fmt::format("translation = [{}, 0, 0.18]\nvelocity = [0, 0, -10]\n",
-                                            0.15 + gap),
-                   1e7),
-          1e-4);
-  way.solver.step(400);
-  return norm(way.contacts()[0].impulse) / 10;
-}
-
-TEST(BodyContacts, DoNotActBesideEdges) {
-  // Edges of a coarse block act from a twentieth of its spacing on where those of a fine one cross
-  // them.
-  EXPECT_EQ(lost_beside("nodes", 0.0051), 0);
-  EXPECT_EQ(lost_beside("cells", 0.0051), 0);
-  EXPECT_LE(lost_beside("nodes", 0.0025), 0.05);
-}
-
-TEST(BodyContacts, WithoutFrictionBrakeNothingOnCoarsePoints) {
-  Way way("gravity = [0, 0, -9.81]\n" + end + touching +
-              body("ball", "shape = 'sphere'\nradius = 0.03\nspacing = 0.006\n",
-                   "translation = [-0.05, 0, 0.0801]\nvelocity = [0.5, 0, 0]\n", 2e5) +
-              "viscosity = 5e-4\n" +
-              body("plate", "shape = 'block'\nsize = [0.4, 0.1, 0.1]\nspacing = 0.0125\n",
-                   "[[body.fixed]]\nall = true\n"),
-          2e-4);
-  way.solver.step(500);
-  EXPECT_GT(way.contacts()[0].impulse.z, 0.05);
-  EXPECT_NEAR(velocity_of(way, 0).x, 0.5, 1e-6);
 }
 
 TEST(BodyContacts, LeaveBodiesAtRestThatTouch) {
