@@ -38,7 +38,7 @@ def points_of(across):
 
 
 def newton(scene, *settings):
-    """Runs newton_contact.py: its file, or None if it did not come to its end."""
+    """Runs newton_contact.py: the arrays it writes, or why it failed."""
     with tempfile.TemporaryDirectory() as folder:
         out = pathlib.Path(folder) / "out.npz"
         ran = subprocess.run([sys.executable, str(HERE / "newton_contact.py"), scene, str(out), *map(str, settings)],
@@ -179,8 +179,8 @@ def main():
     parser.add_argument("--cores", type=int, nargs="+", default=[0], help="one run at a time on each")
     parser.add_argument("--across", type=int, nargs="+", default=[8, 12, 16])
     parser.add_argument("--programs", nargs="+", choices=["phyxel", "lammps", "newton"],
-                        default=["phyxel", "lammps", "newton"], help="those that run; the table keeps the rows of the others")
-    parser.add_argument("--scenes", nargs="+", choices=["balls", "drop"], default=["balls", "drop"], help="likewise")
+                        default=["phyxel", "lammps", "newton"], help="programs to run; the table keeps the rows of other programs")
+    parser.add_argument("--scenes", nargs="+", choices=["balls", "drop"], default=["balls", "drop"], help="scenes to run; the table keeps the rows of other scenes")
     options = parser.parse_args()
     options.lmp, options.phyxel = (str(pathlib.Path(p).resolve()) for p in (options.lmp, options.phyxel))
     manager = multiprocessing.Manager()

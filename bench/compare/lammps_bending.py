@@ -16,7 +16,7 @@ import os
 import re
 import subprocess
 
-from lammps import RESULTS, loop_time, output_of, processor
+from lammps import RESULTS, SHARES, loop_time, output_of, processor
 
 FREQUENCY = 0.99945  # [Hz]: finite elements, as in `phyxel accuracy bending`
 PERIODS = 10
@@ -34,7 +34,7 @@ def frequency(looks):
 
 
 def lammps_rows(lmp, across, ranks):
-    for share in (0.6, 0.5, 0.4, 0.3, 0.2, 0.1):
+    for share in SHARES:
         step = share * 0.2 / across / WAVE
         # Long enough for ten periods of the softer, coarse bars.
         steps = int((PERIODS + 1.2) * (1.8 if across < 6 else 1.4) / FREQUENCY / step)

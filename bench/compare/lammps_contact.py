@@ -7,10 +7,7 @@ import tempfile
 
 import contact_scenes as scenes
 import numpy as np
-from lammps import HERE, loop_time
-
-
-SHARES = (0.6, 0.5, 0.4, 0.3, 0.2, 0.1)  #: Steps tried, of the time of a pressure wave along a spacing.
+from lammps import SHARES, command, loop_time
 
 
 def write_particles(file, bodies, shares, spacing, low, high):
@@ -29,10 +26,7 @@ def write_particles(file, bodies, shares, spacing, low, high):
 
 def output_of(lmp, script, **variables):
     """The output of LAMMPS for a script of this folder, on the core of this process."""
-    command = [lmp, "-in", str(HERE / script), "-log", "none"]
-    for name, value in variables.items():
-        command += ["-var", name, str(value)]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return subprocess.run(command(lmp, script, **variables), capture_output=True, text=True, check=True).stdout
 
 
 def busy(output):

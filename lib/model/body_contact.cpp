@@ -84,8 +84,8 @@ std::shared_ptr<const DistanceArrays> distances_of(const BodyRequest& request, S
                              request.name, defects.describe())));
   }
   orient(surface);
-  // Distances are asked for half a spacing from points that touch; far coarser bodies must not make
-  // the grid too large.
+  // Points of other bodies look a distance up half of their own spacing away from the surface. The
+  // limit keeps grids small beside far coarser bodies.
   constexpr double of_support = 0.5, most = 8;
   const double margin = std::min(of_support * largest, most * supports.most);
   return std::make_shared<const DistanceArrays>(

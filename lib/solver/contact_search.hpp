@@ -48,8 +48,8 @@ PHYXEL_HD int part_of_list(const ContactCandidate& point) { return point.id % co
 
 /// True if a phyxel of a surface comes into the list of a point, if their bodies touch.
 PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& other, double skin) {
-  // Points far apart would press on a fine surface like nails; it has points of its own. But edges
-  // and corners come between those.
+  // Points far apart would press on a fine surface like nails; it has points of its own. Edges
+  // and corners act all the same, for they come between the points of a fine surface.
   constexpr double coarser = 1.5;
   if (!point.site.is_edge() && point.site.range > coarser * other.site.range) return false;
   const double range = common_range(point.site.range, other.site.range);

@@ -1,4 +1,4 @@
-/// Threads for what the host does beside a backend.
+/// The number of threads of the host that work beside a backend.
 #pragma once
 
 #include <omp.h>

@@ -65,9 +65,8 @@ void RigidContacts::add_touch(const Placed& of_tips, const Placed& other, Vec3d 
   };
   add(of_tips, 1, touch.arm);
   add(other, -1, touch.other_arm);
-  constexpr double recovery = 0.2;  // of the depth, in a step
   const SurfaceTouch as_surface{.is_inside = true, .gap = gap.distance, .normal = gap.normal};
-  touch.target = target_velocity(as_surface, now, before, law, {.rate = recovery / dt}, dt);
+  touch.target = target_velocity(as_surface, now, before, law, {.rate = recovery_in_step / dt}, dt);
   touches_.push_back(touch);
 }
 

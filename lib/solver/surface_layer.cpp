@@ -40,8 +40,8 @@ double fall_beside(const PlacedDistances& own, Vec3d place, Vec3d normal, double
   return most;
 }
 
-/// Sets where a phyxel's distance from other bodies is looked up and, of one that lies on its
-/// body's surface, the level of that and how it falls away, from the distances of places around it.
+/// Sets the direction inwards of a phyxel and, if it lies on its body's surface, the level and the
+/// fall of the surface there, from the distances of places around it.
 void look_around(SurfaceSite& site, const PlacedDistances& own) {
   const double spacing = 0.45 * site.range;
   // Along axes that turn with the body, so that copies find the same.

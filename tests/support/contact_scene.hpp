@@ -74,7 +74,7 @@ inline constexpr double dt = 5e-4;  // a tenth of the largest stable step withou
 inline const std::string end = "[time]\nend = 1\n";
 inline std::string obstacle(const std::string& keys) { return "[[obstacle]]\n" + keys; }
 
-/// What friction and impacts have taken from the bodies [J].
+/// The energy that bodies have lost to friction and impacts [J].
 inline double energy_lost(const std::vector<ContactReading>& contacts) {
   double lost = 0;
   for (const ContactReading& c : contacts) lost += c.friction_heat + c.impact_loss;

@@ -114,7 +114,7 @@ TEST(DistanceFields, AreExactAboveFlatFacesHoweverFarAway) {
 }
 
 TEST(DistanceFields, HaveTheMarginAskedFor) {
-  // Beside the middle of an edge of the box around a ball it is far from the ball.
+  // Beside the middle of an edge of its box, a ball is farther away than the box.
   const Surface ball = sphere({}, 1, 3);
   const Vec3d x{1.75, 1.75, 0};
   EXPECT_LT(distances_from(ball, 0.05, 0.1).view().gap(x).distance, 1.1);

@@ -1,5 +1,5 @@
-/// Edges and corners of bodies that touch each other, coarse ones on fine ones and the reverse:
-/// what they keep out of, what they must not act on, and the energy they make.
+/// Edges and corners of bodies of different spacings that touch each other: depths, contact beside
+/// bodies, and the energy that contact makes.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -26,19 +26,18 @@ TEST(EdgesOfBodies, MakeLittleEnergyWhereAFineCornerHitsACoarseEdge) {
     EXPECT_GT(norm(way.contacts()[0].impulse), 1e-3);
     return -energy_lost(way.contacts()) / start;
   };
-  // Where it lies with a corner on the coarse one's corner, it was 54%, and half of its weight was
-  // lost in sideways impulses, while the coarse corner did not act.
+  // At the first place it was 54%, and grew as the step shrank, before depth was recovered slowly.
   for (const std::string place : {"[0.06, 0.055, 0.07]", "[0.062, 0.062, 0.07]",
                                   "[0.052, 0.048, 0.066]", "[0.06, 0, 0.07]"}) {
     EXPECT_LT(made(place, 2e-4), 0.1) << place;
-    EXPECT_LT(made(place, 2.5e-5), 0.05) << place;  // it must not grow as steps shrink
+    EXPECT_LT(made(place, 2.5e-5), 0.05) << place;  // short steps make no more
   }
 }
 
-/// How deep the lowest place of a coarse cube on a corner or an edge goes into a finer plate that
-/// is held [m], and the speed at which the cube is thrown back over the one with which it has come.
+/// The impact of a coarse cube, on a corner or an edge, on a finer plate that is held.
 struct Landing {
-  double depth = 0, rebound = 0;
+  double depth = 0;    ///< Of the cube's lowest surfel below the plate's surface [m].
+  double rebound = 0;  ///< Speed after the impact over the speed before it.
 };
 Landing landing_of(const std::string& rotation, double height, double spacing) {
   Way way(end + touching +
@@ -65,7 +64,7 @@ Landing landing_of(const std::string& rotation, double height, double spacing) {
 }
 
 TEST(EdgesOfBodies, KeepACoarseCornerOutOfAFineSurface) {
-  // It sank by half of its spacing: fine points did not meet it, and it had none that acted.
+  // The cube sank by half of its spacing while its own points did not act.
   for (const double spacing : {0.05, 0.03, 0.017}) {
     const std::string corner = "[38.68, -38.68, 0]", edge = "[45, 0, 0]";
     const Landing on_corner = landing_of(corner, 0.1 * std::sqrt(3), spacing);
@@ -78,7 +77,8 @@ TEST(EdgesOfBodies, KeepACoarseCornerOutOfAFineSurface) {
   }
 }
 
-/// How much of a fine block's momentum is lost as it flies past a coarse one, beside its face.
+/// The part of a fine block's momentum that it loses as it flies past a coarse block, beside a
+/// face.
 double lost_beside(const std::string& lattice, double gap) {
   const std::string of_lattice = "lattice = '" + lattice + "'\n";
   Way way(end + touching +
@@ -94,7 +94,7 @@ double lost_beside(const std::string& lattice, double gap) {
 }
 
 TEST(EdgesOfBodies, DoNotActBesideEdges) {
-  // Edges of a coarse block act from a twentieth of its spacing on where those of a fine one cross
+  // Edges of a coarse block act within a twentieth of its spacing where edges of a fine block cross
   // them.
   EXPECT_EQ(lost_beside("nodes", 0.0051), 0);
   EXPECT_EQ(lost_beside("cells", 0.0051), 0);

@@ -75,6 +75,21 @@ std::vector<Vec3d> impulses(Vec3d degrees, bool late) {
   return found;
 }
 
+TEST(Copies, OfAFineBodyHaveAFieldThatReachesToCoarsePoints) {
+  // Points of the coarse block look distances up a quarter of their support away.
+  const Model model = build_model(parse_scene(
+      end + touching + brick("fine", {}, {}) +
+          "[[body]]\nname = 'coarse'\nshape = 'block'\nsize = [1.4, 1.4, 1.4]\nspacing = 0.35\n"
+          "lattice = 'nodes'\ntranslation = [0, 0, 1]\n" +
+          material,
+      "scene.toml"));
+  double coarse = 0;
+  for (const double support : model.neighbourhood.support) coarse = std::max(coarse, support);
+  const DistanceField& field = model.body_contact.distances[0].arrays->shape;
+  EXPECT_LE(field.low.x, field.box_low.x - 0.25 * coarse);
+  EXPECT_LE(field.low.z, field.box_low.z - 0.25 * coarse);
+}
+
 TEST(Copies, ThatAreTurnedGiveTheSameForcesTurned) {
   const std::vector<Vec3d> expected = impulses({}, false);
   EXPECT_GT(norm(expected[0]), 1);

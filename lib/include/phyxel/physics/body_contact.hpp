@@ -37,10 +37,11 @@ struct SurfaceSite {
   double offset = 0;      ///< Its distance from its body's surface [m].
   double range = 0;       ///< Distance up to which it knows of other surfaces [m].
   double wave_speed = 0;  ///< Of pressure waves in its body [m/s].
-  /// Sine of the angle by which its body's surface falls away there, if it lies on it.
+  /// Sine of the angle by which its body's surface falls away beside it: 0.7 at an edge of a box.
+  /// 0 if it lies below the surface.
   double fall = 0;
 
-  /// True if its body's surface has an edge or a corner there: 0.7 at edges of a box.
+  /// True if it lies on an edge or a corner of its body's surface.
   PHYXEL_HD bool is_edge() const { return fall > 0.25; }
 };
 
@@ -365,21 +366,24 @@ PHYXEL_HD double mobility_along(Vec3<double> mobility, Vec3<double> way) {
   return way.x * way.x * mobility.x + way.y * way.y * mobility.y + way.z * way.z * mobility.z;
 }
 
-/// How fast a point that is inside a body as a step starts is led out.
+/// The speed at which a point that is inside a body as a step starts is moved out of it.
 struct DepthRecovery {
-  double rate = 0;         ///< Part of the depth by time [1/s].
-  double fastest = 1e300;  ///< Most depth by time [m/s].
+  double rate = 0;         ///< Speed over depth [1/s].
+  double fastest = 1e300;  ///< Largest speed [m/s].
 };
 
-/// A fifth of the depth in a step, up to a hundredth of the range, but in steps far below the
-/// stable one no more by time than in that, or what came upon it deep inside would be flung out,
-/// the faster the shorter steps are.
+/// The part of the depth at its start by which a step moves a point out of a body.
+inline constexpr double recovery_in_step = 0.2;
+
+/// The recovery of a point of a surface: a fifth of the depth in a step, up to a hundredth of the
+/// range. Steps far below the stable one recover as much by time as a stable one, since a fifth of
+/// the depth in a very short step would fling the point out.
 PHYXEL_HD DepthRecovery depth_recovery(const SurfaceSite& site, double dt) {
-  constexpr double part = 0.2, most = 0.01;  // of a step
-  constexpr double stable = 0.5;             // steps are at most as many times range / wave speed
+  constexpr double most = 0.01;   // of the range in a step
+  constexpr double stable = 0.5;  // stable steps are at most as many times range / wave speed
   const double in_stable = site.wave_speed / (stable * site.range);  // [1/s]
   const double rate = in_stable < 1 / dt ? in_stable : 1 / dt;
-  return {part * rate, most * site.range * rate};
+  return {recovery_in_step * rate, most * site.range * rate};
 }
 
 /// The least velocity along n̄ with which a step shall end, so that it closes the gap and throws
@@ -389,8 +393,8 @@ PHYXEL_HD DepthRecovery depth_recovery(const SurfaceSite& site, double dt) {
 ///
 /// where v is the velocity of the point relative to the surface before contact, v⁻ that at the
 /// start of the step, and e the restitution, which counts for points that approach. Where the point
-/// was inside as the step started, g⁻ < 0, a part of it is made good, so that points that come upon
-/// each other deep inside, as at corners, are not flung apart.
+/// was inside as the step started, g⁻ < 0, the step recovers a part of the depth (`DepthRecovery`),
+/// so that points that meet deep inside, as at corners, are not flung apart.
 /// @param recovery of the point
 PHYXEL_HD double target_velocity(const SurfaceTouch& touch, Vec3<double> velocity,
                                  Vec3<double> earlier, const ContactLaw& law,
