@@ -61,40 +61,57 @@ Entries entries_of(DeviceArray<std::uint64_t> keys, const Candidates& points,
   return found;
 }
 
-/// Sorts the entries of each point and body by the patches of the surface, and returns these.
-Numbers sort_by_patches(Entries& entries, const Candidates& points) {
+/// Repeats the entries of each point and body for each of its patches, if there are some, and
+/// returns the patches; none if no point is beside several.
+Numbers repeat_for_patches(Entries& entries, const Candidates& points) {
   const std::size_t count = entries.keys.size();
   const Numbers sums = running_sums(entries.begins);
   const auto rows = static_cast<std::size_t>(last_of(sums));
-  Numbers row(count, name), patch(count, name);
+  Numbers row(count, name);
   for_each("number_rows", count_of(count),
            [sums = sums.data(), row = row.data()] __device__(std::int64_t e) {
              row[e] = sums[e + 1] - 1;
            });
   const DeviceArray<Offset> start = starts_of<Offset>(row, rows, name);
-  for_each("find_patches", count_of(rows),
-           [start = start.data(), near = entries.near.data(), patch = patch.data(),
-            points = points.data()] __device__(std::int64_t r) {
+  const auto divided = cleared<char>(rows);
+  for_each("divide_rows", count_of(count),
+           [start = start.data(), row = row.data(), keys = entries.keys.data(),
+            near = entries.near.data(), points = points.data(), divided = divided.data(),
+            n = points.size()] __device__(std::int64_t e) {
+             const Index r = row[e];
              const Offset first = start[r];
-             find_patches(
-                 static_cast<Index>(start[r + 1] - first),
-                 [&](Index k) -> const SurfaceSite& { return points[near[first + k]].site; },
-                 [&](Index k) -> Index& { return patch[first + k]; });
+             if (is_far_from_others(points[keys[e] / n].site.range, points[near[e]].site,
+                                    start[r + 1] - first, [&](Offset k) -> const SurfaceSite& {
+                                      return points[near[first + k]].site;
+                                    })) {
+               divided[r] = 1;
+             }
            });
-  const auto most = static_cast<std::uint64_t>(reduce(patch.data(), count_of(count), 0, Larger{}));
-  if (most == 0) return {};
-  DeviceArray<std::uint64_t> order(count, name);
-  Numbers sorted(count, name);
-  for_each("order_patches", count_of(count),
-           [row = row.data(), patch = patch.data(), order = order.data(), sorted = sorted.data(),
-            most] __device__(std::int64_t e) {
-             order[e] = static_cast<std::uint64_t>(row[e]) * (most + 1) +
-                        static_cast<std::uint64_t>(patch[e]);
-             sorted[e] = static_cast<Index>(e);
+  DeviceArray<Offset> copies(rows, name);  // entries of all patches of a row
+  for_each("count_patches", count_of(rows),
+           [start = start.data(), divided = divided.data(),
+            copies = copies.data()] __device__(std::int64_t r) {
+             copies[r] = (divided[r] ? most_patches : 1) * (start[r + 1] - start[r]);
            });
-  sort_pairs(order, sorted, bits_below(rows * (most + 1)));
-  entries.keys = gathered(entries.keys, sorted);
-  return gathered(patch, sorted);
+  const DeviceArray<Offset> first = running_sums(copies);
+  const auto all = static_cast<std::size_t>(last_of(first));
+  if (all == count) return {};
+  DeviceArray<std::uint64_t> keys(all, name);
+  Numbers patch(all, name);
+  for_each("repeat_entries", count_of(count),
+           [start = start.data(), row = row.data(), divided = divided.data(), first = first.data(),
+            old = entries.keys.data(), keys = keys.data(),
+            patch = patch.data()] __device__(std::int64_t e) {
+             const Index r = row[e];
+             const Offset size = start[r + 1] - start[r];
+             for (int p = 0; p < (divided[r] ? most_patches : 1); ++p) {
+               const Offset at = first[r] + p * size + e - start[r];
+               keys[at] = old[e];
+               patch[at] = p;
+             }
+           });
+  entries.keys = std::move(keys);
+  return patch;
 }
 
 }  // namespace
@@ -176,12 +193,13 @@ DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerVi
 
 FoundRows rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
                   const Numbers& by_list) {
-  const std::size_t n = points.size(), count = keys.size();
+  const std::size_t n = points.size();
   FoundRows found;
   Entries entries = entries_of(std::move(keys), points, by_list, {});
   Numbers patch;
-  if (count > 0) patch = sort_by_patches(entries, points);
+  if (entries.keys.size() > 0) patch = repeat_for_patches(entries, points);
   if (patch.size() > 0) entries = entries_of(std::move(entries.keys), points, by_list, patch);
+  const std::size_t count = entries.keys.size();
   const Numbers sums = running_sums(entries.begins);
   found.near = std::move(entries.near);
   found.row_of_entry = {count, name};
@@ -196,9 +214,18 @@ FoundRows rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, con
              if (!begins[e]) return;
              const auto p = static_cast<Index>(keys[e] / n);
              const Index body = points[near[e]].body;
-             rows[row] = row_of(points[p], p, body, patch ? patch[e] : 0,
+             rows[row] = row_of(points[p], p, body, patch ? patch[e] : 0, 1,
                                 layer.law[layer.partner_of(points[p].body, body)]);
            });
+  found.have_patches = patch.size() > 0;
+  if (found.have_patches) {
+    for_each(
+        "set_patches", count_of(found.rows.size()),
+        [rows = found.rows.data(), all = count_of(found.rows.size())] __device__(std::int64_t r) {
+          const bool is_divided = rows[r].patch > 0 || (r + 1 < all && rows[r + 1].patch > 0);
+          if (is_divided) rows[r].patches = most_patches;
+        });
+  }
   found.keys = std::move(entries.keys);
   return found;
 }

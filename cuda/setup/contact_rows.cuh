@@ -44,10 +44,12 @@ using Numbers = DeviceArray<Index>;
 
 /// Rows and their entries, in terms of candidates.
 struct FoundRows {
-  DeviceArray<std::uint64_t> keys;  ///< Ascending: by point, then as lists are.
-  Numbers near;                     ///< Of each entry: its candidate.
+  /// By point and body, ascending, for each patch; as of `entries_among`.
+  DeviceArray<std::uint64_t> keys;
+  Numbers near;  ///< Of each entry: its candidate.
   Numbers row_of_entry;
   DeviceArray<ContactRow> rows;  ///< Their points are numbers of candidates.
+  bool have_patches = false;     ///< True if a point is beside several patches of a body.
 };
 
 inline std::int64_t count_of(std::size_t size) { return static_cast<std::int64_t>(size); }

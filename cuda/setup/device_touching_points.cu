@@ -43,7 +43,7 @@ DeviceArray<char> in_rows(const FoundRows& found, const Candidates& points, int 
 }
 
 /// Flags all points of the rows that have a flagged point. @returns flags of the entries of these
-/// rows
+/// rows, for one patch alone
 DeviceArray<char> spread(const FoundRows& found, const DeviceArray<char>& flags) {
   const std::int64_t entries = count_of(found.near.size());
   const auto touched = cleared<char>(found.rows.size());
@@ -57,7 +57,7 @@ DeviceArray<char> spread(const FoundRows& found, const DeviceArray<char>& flags)
            [near = found.near.data(), row = found.row_of_entry.data(), rows = found.rows.data(),
             flags = flags.data(), touched = touched.data(),
             of_entry = of_entry.data()] __device__(std::int64_t e) {
-             of_entry[e] = touched[row[e]];
+             of_entry[e] = touched[row[e]] && rows[row[e]].patch == 0;
              if (touched[row[e]]) flags[near[e]] = flags[rows[row[e]].point] = 1;
            });
   return of_entry;
@@ -135,6 +135,7 @@ void set_lists(const Candidates& points, const Numbers& number, FoundRows found,
       grouped(std::move(list_of_point), contact_threads * count);
   std::tie(lists.rows_from_start, lists.rows_from) = grouped(std::move(point), count);
   lists.rows = std::move(found.rows);
+  lists.have_patches = found.have_patches;
   lists.near = std::move(found.near);
   lists.row_of_entry = std::move(found.row_of_entry);
 }

@@ -32,6 +32,7 @@ class DeviceTouchingPoints {
     DeviceArray<SurfaceSite> site;  ///< Shape [points].
     DeviceArray<Index> id;          ///< Shape [points].
     DeviceArray<ContactRow> rows;
+    bool have_patches = false;  ///< True if a point of a row is beside several patches of a body.
     DeviceArray<Index> near, row_of_entry, entries_of, rows_from;
     DeviceArray<Offset> near_start, entries_of_start, rows_from_start;
   };

@@ -109,6 +109,10 @@ __global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
 }
 
 // One group of threads per row or point.
+static __global__ void find_patches(ContactPasses passes, int rows) {
+  const ThreadGroup threads;
+  if (threads.number() < rows) passes.find_patch(threads, threads.number());
+}
 static __global__ void find_touches(ContactPasses passes, int rows) {
   const ThreadGroup threads;
   if (threads.number() < rows) passes.find_touch(threads, threads.number());

@@ -81,7 +81,7 @@ class DeviceBodyContacts {
     const PenaltyPasses passes = penalties();
     m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
     if (m_.share()) refresh(motion_);
-    launch_groups("find_touches", find_touches, rows(), passes, rows());
+    find_touches(passes);
     launch_groups("find_row_pushes", find_row_pushes, rows(), passes, rows());
     launch_groups("push_apart", cuda::push_apart<Real, StateReal>, count(), m_.fields(), passes,
                   places(), regain_.data());
@@ -107,9 +107,9 @@ class DeviceBodyContacts {
     std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() +
                         layer_found_.bytes() + group_begin_.bytes() + group_end_.bytes() +
                         ways_.bytes() + sums_.bytes() + points_.bytes() + motion_.bytes() +
-                        velocity_.bytes() + response_.bytes() + carries_.bytes() + touch_.bytes() +
-                        force_.bytes() + share_.bytes() + forces_.bytes() + gradients_.bytes() +
-                        regain_.bytes() + modulus_.bytes();
+                        velocity_.bytes() + response_.bytes() + carries_.bytes() +
+                        in_patch_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
+                        forces_.bytes() + gradients_.bytes() + regain_.bytes() + modulus_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -129,6 +129,10 @@ class DeviceBodyContacts {
     return places;
   }
 
+  void find_touches(const ContactPasses& passes) const {
+    if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, rows());
+    launch_groups("find_touches", cuda::find_touches, rows(), passes, rows());
+  }
   /// Moves phyxels out of the bodies that the step has led them into.
   void move_apart() {
     const ContactPasses passes = this->passes();
@@ -136,7 +140,7 @@ class DeviceBodyContacts {
       refresh(motion_);
       refresh(velocity_);
     }
-    launch_groups("find_touches", find_touches, rows(), passes, rows());
+    find_touches(passes);
     launch_groups("find_shares", find_shares, points(), passes, points());
     launch_groups("find_responses", find_responses, rows(), passes, rows());
     for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
@@ -207,6 +211,11 @@ class DeviceBodyContacts {
     response_ = {rows, name};
     force_ = {rows, name};
     carries_ = {lists().near.size(), name};
+    in_patch_ = {};
+    if (lists().have_patches) {
+      in_patch_ = {lists().near.size(), name};
+      PHYXEL_CUDA(cudaMemset(in_patch_.data(), 1, in_patch_.bytes()));
+    }
     if (!pushes_) return;
     regain_ = points_.regains(dt);
     modulus_ = points_.wave_moduli();
@@ -259,6 +268,7 @@ class DeviceBodyContacts {
             .response = response_.data(),
             .force = force_.data(),
             .carries = carries_.data(),
+            .in_patch = in_patch_.data(),
             .share = share_.data(),
             .dt = dt_};
   }
@@ -284,6 +294,7 @@ class DeviceBodyContacts {
   DeviceArray<SurfaceMotion> motion_;
   DeviceArray<Vec3<double>> velocity_;
   DeviceArray<SurfaceShare> carries_;
+  DeviceArray<char> in_patch_;
   DeviceArray<SurfaceTouch> touch_;
   DeviceArray<SurfaceResponse> response_;
   DeviceArray<SurfaceForce> force_;

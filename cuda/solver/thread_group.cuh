@@ -40,6 +40,19 @@ class ThreadGroup {
     for (int k = 0; k < 9; ++k) all(k / 3, k % 3) = sum(part(k / 3, k % 3));
     return all;
   }
+  __device__ NearestPhyxel nearest(NearestPhyxel own) const {
+    int thread = thread_;
+    for (int way = size / 2; way > 0; way /= 2) {
+      const auto of_other = [&](auto value) { return __shfl_xor_sync(mask_, value, way); };
+      const NearestPhyxel other{of_other(own.square),
+                                {of_other(own.rest.x), of_other(own.rest.y), of_other(own.rest.z)}};
+      const int its = of_other(thread);
+      if (other.square > own.square || (other.square == own.square && its > thread)) continue;
+      own = other;
+      thread = its;
+    }
+    return own;
+  }
   __device__ bool is_first() const { return thread_ == 0; }
 
  private:

@@ -261,37 +261,61 @@ bool touches_anything(const Scene& scene, std::size_t body) {
   return !scene.obstacles.empty() || touches_bodies(scene, body);
 }
 
-void add_contact(Model& model, const Scene& scene) {
-  model.obstacles = obstacles_of(scene);
-  if (model.obstacles.empty() && !scene.contact) return;
-  std::vector<double> offset(model.position.size(), -1);
+namespace {
+
+/// A body that touches something, and the distances of its phyxels from its surface.
+struct TouchingBody {
+  const Part& first;                      ///< Of its parts.
+  std::size_t begin = 0, count = 0;       ///< Its phyxels.
+  std::vector<double> spacing, distance;  ///< Of each phyxel [m].
+};
+
+std::vector<TouchingBody> touching_bodies(const Model& model, const Scene& scene) {
+  std::vector<TouchingBody> bodies;
   for (auto part = model.parts.begin(); part != model.parts.end();) {
     const auto next = part + static_cast<std::ptrdiff_t>(model.parts_of_body(*part).size());
     const auto body = static_cast<std::size_t>(part->body);
-    const BodyRequest& request = scene.bodies[body];
-    const auto begin = static_cast<std::size_t>(part->begin),
-               count = static_cast<std::size_t>((next - 1)->end) - begin;
-    const std::span<const Triangle> triangles = model.surfels.triangles_of(*part);
-    if (count == 0 || !touches_anything(scene, body)) {
-      part = next;
-      continue;
-    }
-    check_touches(request, triangles);
-    const std::vector<double> spacing = tabulated(count, [&](std::size_t k) {
-      return local_spacing(request.neighbourhood, model.neighbourhood.support[begin + k]);
-    });
-    const std::vector<double> distance = distances_from_surface(
-        std::span(model.position).subspan(begin, count), spacing,
-        std::span(model.surfels.position)
-            .subspan(part->surfel_begin, part->surfel_end - part->surfel_begin),
-        triangles, part->surfel_begin);
-    LayerCounts counts;
-    for (std::size_t k = 0; k < count; ++k) counts.add(distance[k], spacing[k]);
-    check_layer(request, counts);
-    for (std::size_t k = 0; k < count; ++k) {
-      offset[begin + k] = contact_offset(distance[k], spacing[k], counts.has_layer());
+    const auto begin = static_cast<std::size_t>(part->begin);
+    const std::size_t count = static_cast<std::size_t>((next - 1)->end) - begin;
+    if (count > 0 && touches_anything(scene, body)) {
+      check_touches(scene.bodies[body], model.surfels.triangles_of(*part));
+      bodies.push_back({*part, begin, count, {}, {}});
     }
     part = next;
+  }
+  return bodies;
+}
+
+void find_distances(const Model& model, const Scene& scene, TouchingBody& body) {
+  const Part& part = body.first;
+  const NeighbourhoodRule& rule = scene.bodies[static_cast<std::size_t>(part.body)].neighbourhood;
+  for (std::size_t k = 0; k < body.count; ++k) {
+    body.spacing.push_back(local_spacing(rule, model.neighbourhood.support[body.begin + k]));
+  }
+  body.distance = distances_from_surface(
+      std::span(model.position).subspan(body.begin, body.count), body.spacing,
+      std::span(model.surfels.position)
+          .subspan(part.surfel_begin, part.surfel_end - part.surfel_begin),
+      model.surfels.triangles_of(part), part.surfel_begin);
+}
+
+}  // namespace
+
+void add_contact(Model& model, const Scene& scene) {
+  model.obstacles = obstacles_of(scene);
+  if (model.obstacles.empty() && !scene.contact) return;
+  std::vector<TouchingBody> bodies = touching_bodies(model, scene);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t b = 0; b < bodies.size(); ++b) find_distances(model, scene, bodies[b]);
+  std::vector<double> offset(model.position.size(), -1);
+  for (const TouchingBody& body : bodies) {
+    LayerCounts counts;
+    for (std::size_t k = 0; k < body.count; ++k) counts.add(body.distance[k], body.spacing[k]);
+    check_layer(scene.bodies[static_cast<std::size_t>(body.first.body)], counts);
+    for (std::size_t k = 0; k < body.count; ++k) {
+      offset[body.begin + k] =
+          contact_offset(body.distance[k], body.spacing[k], counts.has_layer());
+    }
   }
   add_contact_layer(model, offset);
   set_fields(model);

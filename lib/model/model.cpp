@@ -378,7 +378,8 @@ const Cloud& named_cloud(const BodyRequest& request, const std::map<std::string,
                                              : fmt::format("{}", fmt::join(names, ", "))));
 }
 
-/// `use(request, cloud)` of every body of the scene, its cloud in place.
+/// `use(request, cloud, copies)` of every body of the scene, its cloud in place, and how many more
+/// bodies of the same source follow.
 template <class Use>
 void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& named, Use&& use) {
   for (const SharedSource& source : shared_sources(scene)) {
@@ -386,13 +387,46 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
     Cloud rest = naming(first, [&] {
       return first.source.cloud.empty() ? rest_cloud(source.from) : named_cloud(first, named);
     });
+    std::size_t copies = source.bodies.size();
     for (const std::size_t b : source.bodies) {
       Cloud cloud = rest;
       rest.warnings.clear();  // once is enough
       place(cloud, scene.bodies[b]);
-      use(scene.bodies[b], std::move(cloud));
+      use(scene.bodies[b], std::move(cloud), --copies);
     }
   }
+}
+
+/// Calls use(array) for the arrays of a model that grow with each body.
+template <class Use>
+void for_each_array(Model& model, Use&& use) {
+  Surfels& surfels = model.surfels;
+  Csr &lists = model.neighbourhood.neighbours, &carriers = surfels.carriers;
+  const auto use_all = [&](auto&... arrays) { (use(arrays), ...); };
+  use_all(model.position, model.volume, model.mass, model.neighbourhood.support, lists.offsets,
+          lists.indices, surfels.position, surfels.normal, surfels.triangle, carriers.offsets,
+          carriers.indices);
+}
+
+/// The sizes of these arrays.
+std::vector<std::size_t> sizes_of(Model& model) {
+  std::vector<std::size_t> sizes;
+  for_each_array(model, [&](const auto& array) { sizes.push_back(array.size()); });
+  return sizes;
+}
+
+/// Makes room for copies of the last body, so that arrays do not move as these are added.
+/// @param before sizes of the arrays without that body
+void reserve_for_copies(Model& model, std::span<const std::size_t> before, std::size_t copies) {
+  std::size_t k = 0;
+  for_each_array(model, [&](auto& array) {
+    const std::size_t added = array.size() - before[k++], wanted = array.size() + copies * added;
+    if (wanted <= array.capacity()) return;
+    try {
+      array.reserve(std::max(wanted, 2 * array.capacity()));  // for other bodies, too
+    } catch (const std::bad_alloc&) {  // what does not fit is told body by body
+    }
+  });
 }
 
 /// Adds what needs all bodies of a model.
@@ -409,9 +443,11 @@ Model model_from_sources(const Scene& scene, const DeviceSetup& device) {
   validate(scene);
   Model model;
   model.gravity = scene.gravity;
-  for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud) {
+  for_each_cloud(scene, {}, [&](const BodyRequest& request, const Cloud& cloud, std::size_t more) {
     append(model.warnings, cloud.warnings);
+    const std::vector<std::size_t> before = sizes_of(model);
     naming(request, [&] { add_body(model, request, cloud, device); });
+    reserve_for_copies(model, before, more);
   });
   finish(model, scene, device.close);
   return model;
@@ -439,8 +475,9 @@ Model model_from_clouds(const Scene& scene, std::span<const Cloud> clouds,
 std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named) {
   std::vector<Cloud> clouds;
   naming(scene, [&] {
-    for_each_cloud(scene, named,
-                   [&](const BodyRequest&, Cloud&& cloud) { clouds.push_back(std::move(cloud)); });
+    for_each_cloud(scene, named, [&](const BodyRequest&, Cloud&& cloud, std::size_t) {
+      clouds.push_back(std::move(cloud));
+    });
   });
   return clouds;
 }

@@ -36,6 +36,7 @@ void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
   responses_.assign(rows, {});
   row_forces_.assign(rows, {});
   carries_.assign(points_.row_of_entry().size(), {});
+  in_patch_.assign(points_.have_patches() ? carries_.size() : 0, 1);
   shares_.assign(points, 0);
   is_active_.assign(points, 0);
   forces_.assign(count(), {});
@@ -72,6 +73,7 @@ ContactPasses BodyContacts::passes() {
           .response = responses_.data(),
           .force = row_forces_.data(),
           .carries = carries_.data(),
+          .in_patch = in_patch_.empty() ? nullptr : in_patch_.data(),
           .share = shares_.data(),
           .dt = dt_};
 }
@@ -81,6 +83,7 @@ void BodyContacts::find_touches() {
   const auto rows = static_cast<Index>(touches_.size());
 #pragma omp parallel for schedule(static) num_threads(threads_here())
   for (Index r = 0; r < rows; ++r) {
+    passes.find_patch(OneThread{}, r);
     passes.find_touch(OneThread{}, r);
     is_inside_[r] = touches_[r].is_inside;
   }
@@ -185,7 +188,8 @@ std::size_t BodyContacts::bytes() const {
          watch_.bytes() +
          motion_.size() * (sizeof(SurfaceMotion) + sizeof(Vec3d) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
-         carries_.size() * sizeof(SurfaceShare) + 2 * forces_.size() * sizeof(PointForces) +
+         carries_.size() * sizeof(SurfaceShare) + in_patch_.size() +
+         2 * forces_.size() * sizeof(PointForces) +
          (modulus_.size() + regain_.size()) * sizeof(double);
 }
 

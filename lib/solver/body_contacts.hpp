@@ -49,6 +49,8 @@ class TouchingPoints {
   const Csr& rows_from() const { return rows_from_; }
   /// True if there are rows on any rank.
   bool any() const { return any_; }
+  /// True if a point of a row is beside several patches of a body.
+  bool have_patches() const { return rows_.have_patches(); }
   /// The modulus of pressure waves of each point [Pa]. Of a share: collective.
   std::vector<double> wave_moduli() const;
   /// 1 over what the damping of a step of `dt` [s] keeps of a velocity, of this rank's points.
@@ -269,6 +271,7 @@ class BodyContacts {
   std::vector<SurfaceTouch> touches_;       // shape [rows]
   std::vector<SurfaceResponse> responses_;  // shape [rows]
   std::vector<SurfaceShare> carries_;       // shape [entries]
+  std::vector<char> in_patch_;              // shape [entries]; empty if there are no patches
   std::vector<SurfaceForce> row_forces_;    // shape [rows]
   std::vector<double> shares_;              // c of each point
   std::vector<PointForces> forces_;         // on this rank's points, of the active ones

@@ -54,6 +54,7 @@ void BodyPenalty::find_points(const Vector& u) {
 void BodyPenalty::find_touches() {
   std::vector<SurfaceTouch> touches(points_.rows().size());
   std::vector<SurfaceShare> carries(points_.row_of_entry().size());
+  std::vector<char> in_patch(points_.have_patches() ? carries.size() : 0, 1);
   const ContactPasses passes{.site = points_.sites().data(),
                              .motion = motion_.data(),
                              .row = points_.rows().data(),
@@ -62,8 +63,10 @@ void BodyPenalty::find_touches() {
                              .field = fields_.data(),
                              .touch = touches.data(),
                              .carries = carries.data(),
+                             .in_patch = in_patch.empty() ? nullptr : in_patch.data(),
                              .reach = reach};
   for (std::size_t r = 0; r < touches.size(); ++r) {
+    passes.find_patch(OneThread{}, static_cast<Index>(r));
     passes.find_touch(OneThread{}, static_cast<Index>(r));
   }
   double moved = knows_shapes_ ? 0 : HUGE_VAL;  // as a share of ranges

@@ -4,14 +4,16 @@
 
 #include "phyxel/physics/body_contact.hpp"
 #include "phyxel/physics/contact_penalty.hpp"
+#include "phyxel/physics/surface_patches.hpp"
 
 namespace phyxel {
 
 /// A point of a surface beside another body.
 struct ContactRow {
-  Index point = 0;  ///< Number of the point.
-  Index body = 0;   ///< The body that it may enter.
-  Index patch = 0;  ///< Number of the part of that body's surface among those near the point.
+  Index point = 0;    ///< Number of the point.
+  Index body = 0;     ///< The body that it may enter.
+  Index patch = 0;    ///< Number of the patch of that body's surface (`SurfacePatches`).
+  Index patches = 1;  ///< Rows of the point and the body, one for each patch, with equal lists.
   ContactLaw law;
   double apart = 0;  ///< As of `surface_touch` [m].
 };
@@ -22,10 +24,10 @@ struct PointForces {
   PHYXEL_HD Vec3<double> sum() const { return normal + tangential; }
 };
 
-/// The arrays of the passes. Whoever fills them runs `find_touch` for all rows, `find_share` for
-/// all points, and `find_response` for all rows; then, in each sweep, `find_force` for all rows and
-/// `forces_on` for its own points, whose velocities it changes. Each is run by one thread
-/// (`OneThread`) or by a group that shares the work.
+/// The arrays of the passes. Whoever fills them runs `find_patch` and `find_touch` for all rows,
+/// `find_share` for all points, and `find_response` for all rows; then, in each sweep, `find_force`
+/// for all rows and `forces_on` for its own points, whose velocities it changes. Each is run by one
+/// thread (`OneThread`) or by a group that shares the work.
 struct ContactPasses {
   const SurfaceSite* site = nullptr;  ///< Shape [points], as all others of points.
   const SurfaceMotion* motion = nullptr;
@@ -47,19 +49,39 @@ struct ContactPasses {
   SurfaceResponse* response = nullptr;     ///< Of each row.
   SurfaceForce* force = nullptr;           ///< Of each row.
   SurfaceShare* carries = nullptr;         ///< Of each entry.
-  double* share = nullptr;                 ///< c of each point [m²].
-  double dt = 0;                           ///< [s]
+  /// Of each entry: true if it is of its row's patch; null if no point is beside several.
+  char* in_patch = nullptr;
+  double* share = nullptr;  ///< c of each point [m²].
+  double dt = 0;            ///< [s]
   /// As of `surface_touch`. By default a point has to be inside by more than rounding.
   double reach = -1e-9;
 
+  /// The phyxels that entries name.
+  PHYXEL_HD auto sites() const {
+    return [this](Offset e) -> const SurfaceSite& { return site[near[e]]; };
+  }
+  PHYXEL_HD auto motions() const {
+    return [this](Offset e) -> const SurfaceMotion& { return motion[near[e]]; };
+  }
+
+  /// Of a row of a point beside several patches: tells which entries are of its own.
+  template <class Threads>
+  PHYXEL_HD void find_patch(const Threads& threads, Index r) const {
+    const ContactRow& here = row[r];
+    if (here.patches == 1) return;
+    const SurfacePatches patches(threads, site[here.point], motion[here.point], entries_of_row(r),
+                                 sites(), motions(), here.patches);
+    threads.each(entries_of_row(r), [&](Offset e) {
+      in_patch[e] = here.patch < patches.count() && patches.of(site[near[e]].rest) == here.patch;
+      carries[e] = {};
+    });
+  }
   template <class Threads>
   PHYXEL_HD void find_touch(const Threads& threads, Index r) const {
     const ContactRow& here = row[r];
     const SurfaceTouch found = surface_touch(
-        threads, site[here.point], motion[here.point], entries_of_row(r),
-        [&](Offset e) -> const SurfaceSite& { return site[near[e]]; },
-        [&](Offset e) -> const SurfaceMotion& { return motion[near[e]]; }, field[here.body],
-        here.apart, reach, carries);
+        OfPatch(threads, in_patch), site[here.point], motion[here.point], entries_of_row(r),
+        sites(), motions(), field[here.body], here.apart, reach, carries);
     if (threads.is_first()) touch[r] = found;
   }
   template <class Threads>

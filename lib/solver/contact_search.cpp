@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <tuple>
 
 #include "model/spatial_hash.hpp"
@@ -11,11 +10,6 @@
 
 namespace phyxel {
 namespace {
-
-/// A phyxel near a point, and the patch of its body's surface that it is in.
-struct InPatch {
-  Index phyxel = 0, patch = 0;
-};
 
 /// The phyxels near a point, of bodies that it may touch.
 class Neighbours {
@@ -44,25 +38,6 @@ class Neighbours {
     return found;
   }
 
-  /// The same by bodies, then by patches, then as `of`.
-  std::vector<InPatch> in_patches(std::size_t p) const {
-    std::vector<InPatch> all;
-    for (const Index k : of(p)) all.push_back({k, 0});
-    for (auto begin = all.begin(); begin != all.end();) {
-      const auto body = points_[begin->phyxel].body;
-      const auto end = std::find_if(
-          begin, all.end(), [&](const InPatch& k) { return points_[k.phyxel].body != body; });
-      find_patches(
-          static_cast<Index>(end - begin),
-          [&](Index k) -> const SurfaceSite& { return points_[begin[k].phyxel].site; },
-          [&](Index k) -> Index& { return begin[k].patch; });
-      std::stable_sort(begin, end,
-                       [](const InPatch& a, const InPatch& b) { return a.patch < b.patch; });
-      begin = end;
-    }
-    return all;
-  }
-
  private:
   static double reach(std::span<const ContactCandidate> points, double skin) {
     double range = 0;
@@ -78,7 +53,41 @@ class Neighbours {
   double reach_;
 };
 
+/// The phyxels of one body near a point, as lists have them.
+struct Beside {
+  std::span<const Index> near;  ///< Their numbers.
+  Index patches = 1;            ///< The rows that the point has there.
+};
+
+/// The phyxels near a point, body by body. @param near as of `Neighbours`
+std::vector<Beside> by_bodies(std::span<const ContactCandidate> points, std::size_t p,
+                              std::span<const Index> near) {
+  std::vector<Beside> all;
+  while (!near.empty()) {
+    const auto end = std::find_if(near.begin(), near.end(), [&](Index k) {
+      return points[k].body != points[near.front()].body;
+    });
+    const auto count = static_cast<std::size_t>(end - near.begin());
+    Beside beside{near.first(count)};
+    const auto site_of = [&](std::size_t k) -> const SurfaceSite& {
+      return points[beside.near[k]].site;
+    };
+    for (std::size_t k = 0; k < count && beside.patches == 1; ++k) {
+      if (is_far_from_others(points[p].site.range, site_of(k), count, site_of)) {
+        beside.patches = most_patches;
+      }
+    }
+    all.push_back(beside);
+    near = near.subspan(count);
+  }
+  return all;
+}
+
 }  // namespace
+
+bool ContactRows::have_patches() const {
+  return std::any_of(rows.begin(), rows.end(), [](const ContactRow& r) { return r.patches > 1; });
+}
 
 Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries) {
   Csr csr;
@@ -110,19 +119,21 @@ ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandida
   std::vector<std::pair<Index, Index>> entries;
   if (points.empty()) return found;
   const Neighbours neighbours(contact, points, skin);
-  const std::vector<std::vector<InPatch>> near =
-      tabulated(points.size(), [&](std::size_t p) { return neighbours.in_patches(p); });
+  const std::vector<std::vector<Index>> near =
+      tabulated(points.size(), [&](std::size_t p) { return neighbours.of(p); });
+  const std::vector<std::vector<Beside>> beside =
+      tabulated(points.size(), [&](std::size_t p) { return by_bodies(points, p, near[p]); });
   for (std::size_t p = 0; p < points.size(); ++p) {
-    for (const auto& [k, patch] : near[p]) {
-      const Index body = points[k].body;
-      const bool is_new = found.rows.empty() || found.rows.back().point != static_cast<Index>(p) ||
-                          found.rows.back().body != body || found.rows.back().patch != patch;
-      if (is_new) {
-        found.rows.push_back(row_of(points[p], static_cast<Index>(p), body, patch,
+    for (const Beside& one : beside[p]) {
+      const Index body = points[one.near.front()].body;
+      for (Index patch = 0; patch < one.patches; ++patch) {
+        const auto row = static_cast<Index>(found.rows.size());
+        found.rows.push_back(row_of(points[p], static_cast<Index>(p), body, patch, one.patches,
                                     *contact.law_of(points[p].body, body)));
+        for (const Index k : one.near) {
+          entries.emplace_back(contact_threads * row + part_of_list(points[k]), k);
+        }
       }
-      entries.emplace_back(
-          contact_threads * static_cast<Index>(found.rows.size() - 1) + part_of_list(points[k]), k);
     }
   }
   found.near = grouped(contact_threads * found.rows.size(), entries);

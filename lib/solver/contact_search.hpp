@@ -29,6 +29,9 @@ struct ContactRows {
   /// Numbers of points: for each row, `contact_threads` lists, in each of which they ascend.
   Csr near;
 
+  /// True if a point is beside several patches of a body.
+  bool have_patches() const;
+
   /// The points near that of a row.
   std::span<const Index> near_row(std::size_t r) const {
     const Offset* start = near.offsets.data() + contact_threads * r;
@@ -61,49 +64,11 @@ PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& ot
          !is_within(other.site.rest - point.site.rest, ranges_apart * range);
 }
 
-/// Numbers the patches of a body's surface near a point. Phyxels are of one patch if a chain of
-/// them, each within `ranges_apart` ranges of the next at rest, connects them: two limbs that come
-/// near a point are two patches. Patches are in the order of their first phyxels.
-/// @param count number of phyxels. @param site_of returns that of a phyxel. @param patch_of returns
-/// a reference to the number of its patch, which is set. @returns the number of patches
-template <class SiteOf, class PatchOf>
-PHYXEL_HD Index find_patches(Index count, SiteOf&& site_of, PatchOf&& patch_of) {
-  const auto are_connected = [&](Index a, Index b) {
-    const SurfaceSite &one = site_of(a), &other = site_of(b);
-    const Vec3d way = other.rest - one.rest;
-    const double most = ranges_apart * common_range(one.range, other.range);
-    return dot(way, way) <= most * most;
-  };
-  bool are_one = true;
-  for (Index k = 0; k < count; ++k) {
-    are_one = are_one && are_connected(0, k);
-    patch_of(k) = -1;
-  }
-  Index patches = 0;
-  for (Index first = 0; first < count; ++first) {
-    if (patch_of(first) >= 0) continue;
-    patch_of(first) = patches;
-    for (bool grows = true; grows;) {
-      grows = false;
-      for (Index k = first + 1; k < count; ++k) {
-        bool joins = patch_of(k) < 0 && are_one;
-        for (Index l = first; l < count && patch_of(k) < 0 && !joins; ++l) {
-          joins = patch_of(l) == patches && are_connected(k, l);
-        }
-        if (!joins) continue;
-        patch_of(k) = patches;
-        grows = true;
-      }
-    }
-    ++patches;
-  }
-  return patches;
-}
-
 /// The row of a point beside a patch of a body.
 PHYXEL_HD ContactRow row_of(const ContactCandidate& point, Index number, Index body, Index patch,
-                            const ContactLaw& law) {
-  return {number, body, patch, law, body == point.body ? ranges_apart * point.site.range : 0};
+                            Index patches, const ContactLaw& law) {
+  return {number,  body, patch,
+          patches, law,  body == point.body ? ranges_apart * point.site.range : 0};
 }
 
 /// True if a phyxel of a surface may be near a body whose phyxels are in a box.

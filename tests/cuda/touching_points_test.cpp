@@ -10,8 +10,10 @@
 #include "setup/device_touching_points.hpp"
 #include "setup/tiling.hpp"
 #include "solver/body_contacts.hpp"
+#include "solver/cuda_backend.hpp"
 #include "support/backend.hpp"
 #include "support/contact_scene.hpp"
+#include "support/strewn_surfaces.hpp"
 
 namespace phyxel::cuda {
 namespace {
@@ -96,11 +98,13 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
     EXPECT_EQ(host.reach().partners, device.reach().partners);
     const std::vector<ContactRow> rows = fetched(device.lists().rows);
     ASSERT_EQ(rows.size(), host.rows().size());
+    EXPECT_EQ(device.lists().have_patches, host.have_patches());
     for (std::size_t r = 0; r < rows.size(); ++r) {
       const ContactRow& expected = host.rows()[r];
       ASSERT_EQ(rows[r].point, expected.point);
       ASSERT_EQ(rows[r].body, expected.body);
       ASSERT_EQ(rows[r].patch, expected.patch);
+      ASSERT_EQ(rows[r].patches, expected.patches);
       patches += rows[r].patch > 0;
       ASSERT_EQ(rows[r].law.static_friction, expected.law.static_friction);
       ASSERT_EQ(rows[r].law.restitution, expected.law.restitution);
@@ -134,6 +138,34 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values("[contact]\nfriction = 0.3\n", "[contact]\nself = true\n",
                       "[contact]\n[[contact.pair]]\nfirst = 'b0'\nsecond = 'b1'\nfriction = 0.5\n"
                       "[[contact.pair]]\nfirst = 'b4'\nsecond = 'b0'\nrestitution = 0.5\n"));
+
+TEST(PatchesOnDevice, AreThoseOfTheHost) {
+  const Scene scene = parse_scene(bar_and_cube(1e-3), "scene.toml");
+  const Model model = build_model(scene);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> speed(-1, 1);
+  State start = initial_state(model, scene, dt);
+  const std::vector<Vec3d> places = strewn(model, random);
+  const std::vector<Index>& layer = model.body_contact.layer.phyxels;
+  for (std::size_t k = 0; k < layer.size(); ++k) {
+    start.displacement[layer[k]] = places[k] - model.position[layer[k]];
+    start.velocity[layer[k]] = {speed(random), speed(random), speed(random)};
+  }
+  const auto after_step = [&](std::unique_ptr<Backend> backend) {
+    Solver solver(model, *backend, start, Method::verlet);
+    solver.step(1);
+    return solver.state().velocity;
+  };
+  const std::vector<Vec3d> host = after_step(make_cpu_backend(model, Precision::double_, 1)),
+                           device = after_step(make_cuda_backend(model, Precision::double_));
+  int changed = 0;  // by contact: the material's forces make 1e-4 m/s at most
+  for (std::size_t i = 0; i < host.size(); ++i) {
+    changed += norm(host[i] - start.velocity[i]) > 0.01;
+    // Products and sums are fused on the GPU alone.
+    ASSERT_LE(norm(host[i] - device[i]), 1e-10) << i;
+  }
+  EXPECT_GT(changed, 20);
+}
 
 TEST(TouchingPointsOfDistantBodies, AreNone) {
   const Model model = build_model(

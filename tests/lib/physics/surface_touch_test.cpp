@@ -6,8 +6,8 @@
 
 #include "mesh/distance_field.hpp"
 #include "model/assembly.hpp"
+#include "phyxel/physics/surface_patches.hpp"
 #include "phyxel/solver.hpp"
-#include "solver/contact_search.hpp"
 #include "support/contact_scene.hpp"
 
 namespace phyxel {
@@ -95,23 +95,74 @@ TEST(DistanceOfALonePoint, FallsToNothingWhereASurfaceIsNear) {
   EXPECT_EQ(distance_of_lone_point(3), 0);
 }
 
-TEST(Patches, AreWhatIsConnectedAtRest) {
-  // Steps of 1.5 ranges along a line, a gap of 3, and one phyxel between that comes last.
-  std::vector<SurfaceSite> sites;
-  for (const double x : {0.0, 1.5, 6.0, 7.5, 3.0, 20.0, 0.5}) {
-    sites.push_back({.rest = range * Vec3d{x, 0, 0}, .range = range});
+/// Phyxels near a point at the origin, with which it is lined up along x now.
+class Patches : public ::testing::Test {
+ protected:
+  /// A phyxel at so many ranges along x at rest, and now; it faces the point, or not.
+  void add(double rest, double now, bool faces = true) {
+    sites_.push_back({.rest = range * Vec3d{rest, 0, 0}, .range = range});
+    motions_.emplace_back();
+    motions_.back().after = range * Vec3d{now, 0, 0};
+    motions_.back().out = {0, 0, faces ? -1.0 : 1.0};
   }
-  const auto patches_of = [&](Index count) {
-    std::vector<Index> patch(static_cast<std::size_t>(count));
-    const Index all = find_patches(
-        count, [&](Index k) -> const SurfaceSite& { return sites[k]; },
-        [&](Index k) -> Index& { return patch[k]; });
-    patch.push_back(all);
-    return patch;
-  };
-  EXPECT_EQ(patches_of(2), (std::vector<Index>{0, 0, 1}));
-  EXPECT_EQ(patches_of(4), (std::vector<Index>{0, 0, 1, 1, 2}));
-  EXPECT_EQ(patches_of(7), (std::vector<Index>{0, 0, 1, 1, 0, 2, 0, 3}));
+  /// The patch of each phyxel, and the number of patches.
+  std::vector<int> found(int most = most_patches) const {
+    SurfaceMotion point;
+    point.out = {0, 0, 1};
+    const auto count = static_cast<Offset>(sites_.size());
+    const std::vector<Offset> list{0, count, count, count, count};
+    const SurfacePatches patches(
+        OneThread{}, {.range = range}, point, list.data(),
+        [&](Offset k) -> const SurfaceSite& { return sites_[k]; },
+        [&](Offset k) -> const SurfaceMotion& { return motions_[k]; }, most);
+    std::vector<int> all;
+    for (const SurfaceSite& site : sites_) all.push_back(patches.of(site.rest));
+    all.push_back(patches.count());
+    return all;
+  }
+
+  std::vector<SurfaceSite> sites_;
+  std::vector<SurfaceMotion> motions_;
+};
+
+TEST_F(Patches, AreOneWherePhyxelsAreNearEachOtherAtRest) {
+  add(0, 0.9);
+  add(1.2, 0.1);
+  add(2.4, -0.9);
+  EXPECT_EQ(found(), (std::vector<int>{0, 0, 0, 1}));
+}
+
+TEST_F(Patches, FarFromEachOtherAtRestAreNumberedByTheirDistanceNow) {
+  add(0, 0.5);
+  add(0.6, 0.4);
+  add(9, -0.2);
+  add(8.5, -0.3);
+  add(20, 0.7);
+  EXPECT_EQ(found(), (std::vector<int>{1, 1, 0, 0, 2, 3}));
+  EXPECT_EQ(found(2), (std::vector<int>{1, 1, 0, 0, 0, 2}));
+}
+
+TEST_F(Patches, DoNotDependOnPhyxelsBeyondTheRangeOrOnOtherSides) {
+  add(0, 0.5);
+  add(9, -0.6);
+  const std::vector<int> before = found();
+  EXPECT_EQ(before, (std::vector<int>{0, 1, 2}));
+  for (int k = 1; k < 9; ++k) add(k, 1.01);  // they connect both
+  add(20, 0.2, false);
+  const std::vector<int> after = found();
+  EXPECT_EQ(after[0], 0);
+  EXPECT_EQ(after[1], 1);
+  EXPECT_EQ(after.back(), 2);
+}
+
+TEST_F(Patches, MayBeSeveralIfPhyxelsAreFarFromOthers) {
+  add(0, 0.5);
+  add(2.4, -0.5);
+  const auto site_of = [&](int k) -> const SurfaceSite& { return sites_[k]; };
+  EXPECT_FALSE(is_far_from_others(range, sites_[0], 2, site_of));
+  add(2.6, -0.6);
+  EXPECT_TRUE(is_far_from_others(range, sites_[0], 3, site_of));
+  EXPECT_FALSE(is_far_from_others(range, sites_[1], 3, site_of));
 }
 
 }  // namespace

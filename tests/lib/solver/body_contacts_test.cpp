@@ -1,5 +1,7 @@
 /// Bodies that touch each other, against mechanics: momenta, energies, impacts of bars and balls,
 /// pressure between lattices that do not match, friction, stacks, and what must not touch.
+#include "solver/body_contacts.hpp"
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +9,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <random>
 
 #include "phyxel/reactions.hpp"
 #include "support/contact_scene.hpp"
+#include "support/strewn_surfaces.hpp"
 
 namespace phyxel {
 namespace {
@@ -293,6 +297,51 @@ TEST(BodyContacts, HaveTheSameBitsOnAnyThreadsAndAfterARestart) {
     EXPECT_EQ(expected.velocity, found.velocity);
     EXPECT_EQ(expected.step_sums, found.step_sums);
   }
+}
+
+/// The states after a step of contact between places. @param found_at where points are found
+std::vector<SurfaceState> after_contact(const Model& model, const std::vector<Vec3d>& found_at,
+                                        const std::vector<Vec3d>& places) {
+  BodyContacts contacts(model, 1);
+  const std::vector<Index>& layer = model.body_contact.layer.phyxels;
+  const auto number = [&](Index i) {
+    return std::lower_bound(layer.begin(), layer.end(), i) - layer.begin();
+  };
+  std::vector<SurfaceState> states;
+  for (std::size_t k = 0; k < layer.size(); ++k) {
+    states.push_back({places[k] - model.position[layer[k]], {}});
+  }
+  contacts.begin_step(dt, [&](Index i) {
+    return SurfaceState{found_at[static_cast<std::size_t>(number(i))] - model.position[i], {}};
+  });
+  const std::int64_t generation = contacts.generation();
+  const auto get = [&](Index i) { return states[static_cast<std::size_t>(number(i))]; };
+  contacts.begin_step(dt, get);
+  EXPECT_EQ(contacts.generation(), generation);
+  for (std::size_t p = 0; p < contacts.count(); ++p) contacts.set_gradient(p, {});
+  contacts.keep_apart(get, [&](Index i, const SurfaceState& state) {
+    states[static_cast<std::size_t>(number(i))] = state;
+  });
+  return states;
+}
+
+TEST(BodyContacts, OfFoldedPartsDoNotDependOnWherePointsWereFound) {
+  const Way way(bar_and_cube(1e5), dt);
+  std::mt19937 random(5);
+  const double most = 0.1 * SurfaceLayer(way.model).skin();
+  std::uniform_real_distribution<double> shift(-most, most);
+  int moved = 0;
+  for (int k = 0; k < 20; ++k) {
+    std::vector<Vec3d> places = strewn(way.model, random), earlier = places;
+    for (Vec3d& x : earlier) x += {shift(random), shift(random), shift(random)};
+    const std::vector<SurfaceState> one = after_contact(way.model, places, places),
+                                    other = after_contact(way.model, earlier, places);
+    for (std::size_t p = 0; p < one.size(); ++p) {
+      EXPECT_EQ(one[p].velocity, other[p].velocity) << k << ' ' << p;
+      moved += norm(one[p].velocity) > 0;
+    }
+  }
+  EXPECT_GT(moved, 100);
 }
 
 /// A cube of 0.1 m, 4 phyxels across, on its faces.

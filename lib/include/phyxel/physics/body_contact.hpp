@@ -96,6 +96,13 @@ PHYXEL_HD void set_gradient(SurfaceMotion& motion, const SurfaceSite& site,
 /// that phyxels have in the whole model: sums then do not depend on what else is in a list.
 inline constexpr int contact_threads = 4;
 
+/// The nearest of the phyxels that a thread has looked at.
+inline constexpr double no_square = 1e300;
+struct NearestPhyxel {
+  double square = no_square;  ///< Of its distance [m²]; `no_square`: there is none.
+  Vec3<double> rest;          ///< [m]
+};
+
 /// The work on a list by one thread. A group of threads of a device may share it instead, each with
 /// one part of the list, all with the same sums.
 struct OneThread {
@@ -110,6 +117,8 @@ struct OneThread {
   PHYXEL_HD T sum(const T& part) const {
     return part;
   }
+  /// The nearest of what the threads have found; of equal ones, the first in the list.
+  PHYXEL_HD NearestPhyxel nearest(const NearestPhyxel& own) const { return own; }
   /// True of the thread that writes what all have found.
   PHYXEL_HD bool is_first() const { return true; }
 };
