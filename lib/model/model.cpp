@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "model/assembly.hpp"
 #include "model/box.hpp"
@@ -14,6 +13,7 @@
 #include "model/contact.hpp"
 #include "model/device_setup.hpp"
 #include "model/following.hpp"
+#include "model/growing_arrays.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
 #include "model/neighbour_search.hpp"
@@ -335,36 +335,6 @@ std::string Degenerate::describe() const {
   return fmt::format("degenerate phyxels: {}", fmt::join(kinds, "; "));
 }
 
-Path Motion::path_after(double share) const {
-  Path path{share * displacement, {}, about};
-  if (rotation != Vec3d{}) path.turn = rotation_by(share * rotation) - identity<double>();
-  return path;
-}
-
-Path Motion::path_at(double time) const {
-  const double s = duration > 0 ? std::clamp(time / duration, 0.0, 1.0) : 1.0;
-  Path path = path_after(s * s * (3 - 2 * s));
-  path.displacement +=
-      time * velocity + std::sin(2 * std::numbers::pi * frequency * time) * amplitude;
-  return path;
-}
-
-namespace {
-/// The path that leads from one instant to another.
-Path between(const Path& before, const Path& after) {
-  return {after.displacement - before.displacement, after.turn - before.turn, after.about};
-}
-}  // namespace
-
-Path Motion::last_step(double time, double dt) const {
-  return between(path_at(std::max(time - dt, 0.0)), path_at(time));
-}
-
-Path Motion::mean_step(double time, double dt) const {
-  const Path both = between(path_at(std::max(time - dt, 0.0)), path_at(time + dt));
-  return {0.5 * both.displacement, 0.5 * both.turn, both.about};
-}
-
 namespace {
 
 const Cloud& named_cloud(const BodyRequest& request, const std::map<std::string, Cloud>& named) {
@@ -395,38 +365,6 @@ void for_each_cloud(const Scene& scene, const std::map<std::string, Cloud>& name
       use(scene.bodies[b], std::move(cloud), --copies);
     }
   }
-}
-
-/// Calls use(array) for the arrays of a model that grow with each body.
-template <class Use>
-void for_each_array(Model& model, Use&& use) {
-  Surfels& surfels = model.surfels;
-  Csr &lists = model.neighbourhood.neighbours, &carriers = surfels.carriers;
-  const auto use_all = [&](auto&... arrays) { (use(arrays), ...); };
-  use_all(model.position, model.volume, model.mass, model.neighbourhood.support, lists.offsets,
-          lists.indices, surfels.position, surfels.normal, surfels.triangle, carriers.offsets,
-          carriers.indices);
-}
-
-/// The sizes of these arrays.
-std::vector<std::size_t> sizes_of(Model& model) {
-  std::vector<std::size_t> sizes;
-  for_each_array(model, [&](const auto& array) { sizes.push_back(array.size()); });
-  return sizes;
-}
-
-/// Makes room for copies of the last body, so that arrays do not move as these are added.
-/// @param before sizes of the arrays without that body
-void reserve_for_copies(Model& model, std::span<const std::size_t> before, std::size_t copies) {
-  std::size_t k = 0;
-  for_each_array(model, [&](auto& array) {
-    const std::size_t added = array.size() - before[k++], wanted = array.size() + copies * added;
-    if (wanted <= array.capacity()) return;
-    try {
-      array.reserve(std::max(wanted, 2 * array.capacity()));  // for other bodies, too
-    } catch (const std::bad_alloc&) {  // what does not fit is told body by body
-    }
-  });
 }
 
 /// Adds what needs all bodies of a model.

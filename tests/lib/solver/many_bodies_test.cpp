@@ -223,7 +223,7 @@ TEST(Culling, LeavesOutNothingThatMayTouch) {
     const double x = of(random), y = of(random);
     return size * Vec3d{x, y, of(random)};
   };
-  int clear = 0, touching = 0;
+  int clear = 0, near = 0;
   for (const Obstacle& obstacle : all) {
     const ObstacleStep at = obstacle.step_from(0.1, dt);
     for (int k = 0; k < 300; ++k) {
@@ -240,12 +240,12 @@ TEST(Culling, LeavesOutNothingThatMayTouch) {
           touches = touches || gap_to(shape, at, x).distance < 0.01;
         }
       });
-      touching += touches;
+      near += touches;
       EXPECT_FALSE(is_clear && touches) << obstacle.name;
     }
   }
   EXPECT_GT(clear, 3000);
-  EXPECT_GT(touching, 1000);
+  EXPECT_GT(near, 1000);
 }
 
 /// The states of the phyxels of a model after a step, and its sums, without any culling.

@@ -96,10 +96,12 @@ PHYXEL_HD void set_gradient(SurfaceMotion& motion, const SurfaceSite& site,
 /// that phyxels have in the whole model: sums then do not depend on what else is in a list.
 inline constexpr int contact_threads = 4;
 
-/// The nearest of the phyxels that a thread has looked at.
+/// The squared distance of a phyxel that is not there [m²].
 inline constexpr double no_square = 1e300;
+
+/// The nearest of the phyxels that a thread has looked at.
 struct NearestPhyxel {
-  double square = no_square;  ///< Of its distance [m²]; `no_square`: there is none.
+  double square = no_square;  ///< Of its distance [m²]; `no_square` if there is none.
   Vec3<double> rest;          ///< [m]
 };
 

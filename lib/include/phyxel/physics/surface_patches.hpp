@@ -64,7 +64,8 @@ class SurfacePatches {
     }
   }
 
-  int count() const { return count_; }
+  /// The number of patches.
+  PHYXEL_HD int count() const { return count_; }
   /// The patch of a phyxel. @param rest its place at rest [m]
   PHYXEL_HD int of(Vec3<double> rest) const {
     int found = 0;
@@ -92,12 +93,14 @@ class OfPatch {
   PHYXEL_HD OfPatch(const Threads& threads, const char* in_patch)
       : threads_(threads), in_patch_(in_patch) {}
 
+  /// As of `OneThread`, for the entries of the patch.
   template <class Each>
   PHYXEL_HD void each(const Offset* start, Each&& each) const {
     threads_.each(start, [&](Offset k) {
       if (!in_patch_ || in_patch_[k]) each(k);
     });
   }
+  /// As of `OneThread`.
   template <class T>
   PHYXEL_HD T sum(const T& part) const {
     return threads_.sum(part);
