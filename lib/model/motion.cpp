@@ -2,6 +2,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "model/assembly.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
