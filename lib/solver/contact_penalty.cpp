@@ -203,19 +203,6 @@ void ContactPenalty::add_stiffness_times(const Vector& v, Vector& out) const {
   bodies_.add_stiffness_times(v, out);
 }
 
-void ContactPenalty::precondition(std::span<const double> s, const Vector& free, const Vector& a,
-                                  Vector& x) const {
-  for (const auto& [i, block] : held_) {
-    const double of_axis[] = {free[i].x, free[i].y, free[i].z};
-    Eigen::Matrix3d all = s[i] * Eigen::Matrix3d::Identity();
-    for (int r = 0; r < 3; ++r) {
-      for (int c = 0; c < 3; ++c) all(r, c) += of_axis[r] * of_axis[c] * block(r, c);
-    }
-    const Eigen::Vector3d solved = all.llt().solve(Eigen::Vector3d(a[i].x, a[i].y, a[i].z));
-    x[i] = {solved[0], solved[1], solved[2]};
-  }
-}
-
 double ContactPenalty::largest_depth(const PlacedObstacles& at, const Vector& u) const {
   double deepest = 0;
   for_each_force(at, u, [&](std::size_t k, std::size_t, const PenaltyForce& f, Vec3d) {

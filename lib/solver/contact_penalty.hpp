@@ -80,10 +80,8 @@ class ContactPenalty {
   double squared_size() const;
   /// Adds the stiffness of the last `linearise` times v [N].
   void add_stiffness_times(const Vector& v, Vector& out) const;
-  /// Replaces a / s by the solution x of (s + stiffness) x = a for the phyxels in contact.
-  /// @param s stiffness of each phyxel [N/m]. @param free 1 along free axes, 0 along others
-  void precondition(std::span<const double> s, const Vector& free, const Vector& a,
-                    Vector& x) const;
+  /// The stiffness of the last `linearise` of phyxels in contact against themselves [N/m].
+  const std::map<Index, Mat3d>& held_blocks() const { return held_; }
   /// The depth of the deepest phyxel at displacements u, those of the last `linearise`, as a share
   /// of its support.
   double largest_depth(const PlacedObstacles& at, const Vector& u) const;

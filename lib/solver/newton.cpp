@@ -17,6 +17,7 @@ namespace {
 constexpr double largest_strain = 0.3;  // largest change of strain in one step
 constexpr int most_cuts = 8;
 constexpr double inner_tolerance = 1e-3;
+constexpr double large_gradient = 0.05;  // of u, which the preconditioner has to know
 constexpr int most_inner = 50'000;
 // Limit of conjugate gradient iterations per unknown; in exact arithmetic one per unknown suffices.
 constexpr int most_inner_share = 10;
@@ -54,6 +55,7 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       vectors_(model, host_threads(backend)),
       following_(model),
       contact_(model),
+      preconditioner_(model, vectors_),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
 /// The reason to give a search up, or nothing. @param exhausted number of steps in a row whose
@@ -329,18 +331,21 @@ double Newton::residual(const Balance& balance, const Vector& u, const Vector& f
   return scale > 0 ? std::sqrt(free) / scale : std::sqrt(free) > 0 ? 1 : 0;
 }
 
+double Newton::largest_entry(std::span<const Mat3d> gradient) const {
+  return vectors_.largest([&](Index i) {
+    double entry = 0;
+    for (int e = 0; e < 9; ++e) entry = std::max(entry, std::abs(gradient[i](e / 3, e % 3)));
+    return entry;
+  });
+}
+
 /// The largest entry of ∇u of a displacement.
 double Newton::steepest(const Vector& step) {
   put(step);
   std::vector<Mat3d> gradient;
   backend_.displacement_gradients(gradient);
   ++evaluations_;
-  const double most = vectors_.largest([&](Index i) {
-    double entry = 0;
-    for (int e = 0; e < 9; ++e) entry = std::max(entry, std::abs(gradient[i](e / 3, e % 3)));
-    return entry;
-  });
-  return std::max(most, 1e-300);
+  return std::max(largest_entry(gradient), 1e-300);
 }
 
 /// Computes out = (K + weight) v on free axes, with K v by a difference of forces, and the
@@ -384,6 +389,16 @@ bool Newton::asked_to_stop(int iteration, double inner_residual) {
   return (model_.share ? model_.share->communicator->largest(stop) : stop) > 0;
 }
 
+/// ∇u if it is large, else nothing: the preconditioner depends on u alone, so that a search that
+/// was stopped goes on to the bit.
+std::vector<Mat3d> Newton::present_gradients(const Vector& u) {
+  put(u);
+  std::vector<Mat3d> gradient;
+  backend_.displacement_gradients(gradient);
+  ++evaluations_;
+  return largest_entry(gradient) > large_gradient ? gradient : std::vector<Mat3d>();
+}
+
 /// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by conjugate
 /// gradients preconditioned with `stiffness_` and that of contact. They stop at the first direction
 /// of negative stiffness. @param force,all forces at u without and with contact [N]
@@ -399,11 +414,8 @@ Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const V
   });
 
   Vector way(u.size()), preconditioned(u.size());
-  const auto precondition = [&] {
-    vectors_.for_each([&](Index i) { preconditioned[i] = (1 / stiffness_[i]) * rest[i]; });
-    contact_.precondition(stiffness_, balance.free, rest, preconditioned);
-  };
-  precondition();
+  preconditioner_.set(balance.free, balance.weight, contact_.held_blocks(), present_gradients(u));
+  preconditioner_.apply(rest, preconditioned);
   vectors_.for_each([&](Index i) { way[i] = preconditioned[i]; });
   double product = vectors_.product(rest, preconditioned);
   const double start = product;
@@ -423,7 +435,7 @@ Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const V
       rest[i] -= length * image[i];
     });
     const double before = product;
-    precondition();
+    preconditioner_.apply(rest, preconditioned);
     product = vectors_.product(rest, preconditioned);
     const double share = product / before;
     vectors_.for_each([&](Index i) { way[i] = preconditioned[i] + share * way[i]; });

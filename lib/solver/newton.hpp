@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "phyxel/state.hpp"
 #include "solver/contact_penalty.hpp"
 #include "solver/following_loads.hpp"
+#include "solver/preconditioner.hpp"
 
 namespace phyxel {
 
@@ -127,6 +129,8 @@ class Newton {
   double potential(const Balance& balance, const Vector& u);
   double residual(const Balance& balance, const Vector& u, const Vector& force) const;
   double steepest(const Vector& step);
+  double largest_entry(std::span<const Mat3d> gradient) const;
+  std::vector<Mat3d> present_gradients(const Vector& u);
   void stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                        const Vector& v, Vector& out);
   void find_stiffness(const Balance& balance);
@@ -145,6 +149,7 @@ class Newton {
   OwnedVectors vectors_;
   FollowingLoads following_;
   ContactPenalty contact_;
+  Preconditioner preconditioner_;
   double difference_;              ///< Largest displacement in differences of forces [m].
   std::vector<double> stiffness_;  ///< Estimate for each phyxel against its neighbours [N/m].
   Vector placed_;

@@ -129,7 +129,7 @@ TEST(Implicit, LoadsGrowAndMotionsFollowTheirPaths) {
   scene.bodies[0].loads.push_back({.select = {.all = true}, .force = {54, 0, 0}, .ramp = 2});
   const Model free = model_of(scene, lattice(3, 3, 3, 0.1));  // 27 kg
   const State pushed = run(free, scene, Method::implicit, 0.1, 10).end;
-  EXPECT_NEAR(pushed.velocity[13].x, 0.5, 1e-12);
+  EXPECT_NEAR(pushed.velocity[13].x, 0.5, 1e-8);  // residuals fall to 1e-8
 
   scene.bodies[0].motions.push_back({.select = {.box = Selection::Box{{-1, -1, -1}, {0.1, 1, 1}}},
                                      .displacement = {0.01, 0, 0},

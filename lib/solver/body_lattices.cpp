@@ -1,0 +1,414 @@
+#include "solver/body_lattices.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "rank_exchange.hpp"
+
+namespace phyxel {
+namespace {
+
+constexpr Index worth_threads = 2000;  // nodes
+constexpr Index most_coarsest = 100;   // nodes
+constexpr int numbers = LatticeLevel::around * 9;
+constexpr double whole_hat = 1 << 16;  // quanta of a hat of 1
+
+/// The nearest whole number.
+std::int64_t rounded(double x) { return static_cast<std::int64_t>(x + (x < 0 ? -0.5 : 0.5)); }
+
+/// The lattice of twice a spacing in a box.
+Lattice finest_lattice(const Box& box, double spacing) {
+  const double h = 2 * spacing;
+  const auto nodes = [&](double extent) {
+    return std::max(2, static_cast<int>(std::ceil(extent / h - 1e-6)) + 1);
+  };
+  const Vec3d extent = box.high - box.low;
+  return {box.low, h, {nodes(extent.x), nodes(extent.y), nodes(extent.z)}};
+}
+
+/// Keys of all ranks, ascending, each once. Collective on a share.
+std::vector<std::uint64_t> of_all_ranks(const Communicator* ranks,
+                                        std::vector<std::uint64_t> keys) {
+  const auto make_unique = [&] {
+    std::sort(keys.begin(), keys.end());
+    keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  };
+  make_unique();
+  if (!ranks) return keys;
+  const auto all = exchanged(*ranks, std::vector(static_cast<std::size_t>(ranks->size()), keys));
+  keys.clear();
+  for (const std::vector<std::uint64_t>& some : all) {
+    keys.insert(keys.end(), some.begin(), some.end());
+  }
+  make_unique();
+  return keys;
+}
+
+/// Lists from pairs of a list and a value, in their order.
+template <class Value>
+void group(std::size_t lists, const std::vector<std::pair<Index, Value>>& pairs,
+           std::vector<Offset>& start, std::vector<Value>& values) {
+  start.assign(lists + 1, 0);
+  for (const auto& [list, value] : pairs) ++start[static_cast<std::size_t>(list) + 1];
+  for (std::size_t k = 0; k < lists; ++k) start[k + 1] += start[k];
+  values.resize(pairs.size());
+  std::vector<Offset> next(start.begin(), start.end() - 1);
+  for (const auto& [list, value] : pairs) values[next[list]++] = value;
+}
+
+/// A block without the rows and columns of axes along which nodes do not move.
+Mat3d masked(const Mat3d& block, Vec3d rows, Vec3d columns) {
+  const double r[] = {rows.x, rows.y, rows.z}, c[] = {columns.x, columns.y, columns.z};
+  Mat3d found;
+  for (int e = 0; e < 9; ++e) found(e / 3, e % 3) = r[e / 3] * c[e % 3] * block(e / 3, e % 3);
+  return found;
+}
+
+}  // namespace
+
+BodyLattices::BodyLattices(const Communicator* ranks, const Box& box, double spacing,
+                           std::vector<Source> sources)
+    : ranks_(ranks), sources_(std::move(sources)) {
+  const Lattice lattice = finest_lattice(box, spacing);
+  std::vector<std::uint64_t> keys;
+  keys.reserve(8 * sources_.size());
+  for (const Source& source : sources_) {
+    for (const Vec3<int>& at : LatticeCell(lattice, source.place).node) {
+      keys.push_back(lattice.key(at));
+    }
+  }
+  levels_.emplace_back(lattice, of_all_ranks(ranks, std::move(keys)));
+  find_entries();
+  while (levels_.back().size() > most_coarsest) {
+    const Index before = levels_.back().size();
+    add_level();
+    if (levels_.back().size() < before) continue;
+    levels_.pop_back();  // a chain of nodes far apart
+    transfers_.pop_back();
+    break;
+  }
+  right_.resize(levels_.size());
+  left_.resize(levels_.size());
+}
+
+void BodyLattices::find_entries() {
+  const LatticeLevel& finest = levels_.front();
+  const std::size_t count = sources_.size();
+  node_.resize(8 * count);
+  hat_.resize(8 * count);
+#pragma omp parallel for schedule(static)
+  for (std::size_t p = 0; p < count; ++p) {
+    const LatticeCell cell(finest.lattice(), sources_[p].place);
+    for (int k = 0; k < 8; ++k) {
+      node_[8 * p + k] = finest.number(cell.node[k]);
+      hat_[8 * p + k] = static_cast<float>(std::round(whole_hat * cell.hat[k]) / whole_hat);
+    }
+  }
+  std::vector<std::pair<Index, Index>> pairs;
+  pairs.reserve(node_.size());
+  for (std::size_t e = 0; e < node_.size(); ++e) {
+    pairs.emplace_back(node_[e], static_cast<Index>(e));
+  }
+  group(static_cast<std::size_t>(finest.size()), pairs, entry_start_, entry_);
+  std::vector<std::int64_t> entries;
+  for (Index a = 0; a < finest.size(); ++a) {
+    entries.push_back(entry_start_[a + 1] - entry_start_[a]);
+  }
+  add_over_ranks(entries);
+  for (const std::int64_t n : entries) most_ = std::max(most_, static_cast<double>(n));
+}
+
+void BodyLattices::add_level() {
+  const LatticeLevel& fine = levels_.back();
+  const Lattice lattice = fine.lattice().coarser();
+  std::vector<std::pair<Index, std::pair<std::uint64_t, double>>> terms;
+  std::vector<std::uint64_t> keys;
+  for (Index a = 0; a < fine.size(); ++a) {
+    const Vec3<int> at = fine.node(a);
+    for (int k = 0; k < 8; ++k) {
+      const Vec3<int> up{k >> 2, k >> 1 & 1, k & 1}, odd{at.x % 2, at.y % 2, at.z % 2};
+      if (up.x > odd.x || up.y > odd.y || up.z > odd.z) continue;
+      const Vec3<int> parent{at.x / 2 + up.x, at.y / 2 + up.y, at.z / 2 + up.z};
+      const double weight = std::pow(0.5, odd.x + odd.y + odd.z);
+      terms.push_back({a, {lattice.key(parent), weight}});
+      keys.push_back(terms.back().second.first);
+    }
+  }
+  std::sort(keys.begin(), keys.end());
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  LatticeLevel coarse(lattice, keys);
+  std::vector<std::pair<Index, Transfer::Term>> parents, children;
+  for (const auto& [a, term] : terms) {
+    const auto at = std::lower_bound(keys.begin(), keys.end(), term.first);
+    const auto parent = static_cast<Index>(at - keys.begin());
+    parents.push_back({a, {parent, term.second}});
+    children.push_back({parent, {a, term.second}});
+  }
+  Transfer& made = transfers_.emplace_back();
+  group(static_cast<std::size_t>(fine.size()), parents, made.parent_start, made.parents);
+  group(keys.size(), children, made.child_start, made.children);
+  levels_.push_back(std::move(coarse));
+}
+
+void BodyLattices::set(std::span<const Vec3d> free, std::span<const Mat3d> gradient,
+                       std::span<const Mat3d> more) {
+  assemble(free, gradient, more);
+  for (std::size_t l = 0; l + 1 < levels_.size(); ++l) {
+    levels_[l].begin();
+    coarsen(l);
+  }
+  levels_.back().begin();
+  factor();
+}
+
+/// 1 along the axes along which a node moves: those along which no phyxel near it is held, so that
+/// held ones stay where they are.
+std::vector<Vec3d> BodyLattices::free_nodes(std::span<const Vec3d> free) const {
+  constexpr float counts = 0.01F;  // hat
+  const Index nodes = levels_.front().size();
+  std::vector<std::int64_t> held(3 * static_cast<std::size_t>(nodes), 0);
+  for (std::size_t e = 0; e < node_.size(); ++e) {
+    if (hat_[e] < counts) continue;
+    const Vec3d f = free[sources_[e / 8].phyxel];
+    const auto at = 3 * static_cast<std::size_t>(node_[e]);
+    held[at] += f.x == 0;
+    held[at + 1] += f.y == 0;
+    held[at + 2] += f.z == 0;
+  }
+  add_over_ranks(held);
+  std::vector<Vec3d> found(static_cast<std::size_t>(nodes));
+  for (std::size_t a = 0; a < found.size(); ++a) {
+    const auto is_free = [&](std::size_t axis) { return held[3 * a + axis] == 0 ? 1.0 : 0.0; };
+    found[a] = {is_free(0), is_free(1), is_free(2)};
+  }
+  return found;
+}
+
+/// Adds what the phyxels of this rank near a node give to its blocks, times `by`.
+void BodyLattices::add_terms(Index node, std::span<const Mat3d> gradient,
+                             std::span<const Mat3d> more, double by,
+                             std::span<std::int64_t> sums) const {
+  const Lattice& lattice = levels_.front().lattice();
+  const Vec3<int> here = levels_.front().node(node);
+  for (Offset n = entry_start_[node]; n < entry_start_[node + 1]; ++n) {
+    const auto e = static_cast<std::size_t>(entry_[n]);
+    const Source& source = sources_[e / 8];
+    const LatticeCell cell(lattice, source.place);
+    Mat3d f = identity<double>();
+    if (!gradient.empty()) f = f + gradient[source.phyxel];
+    const Mat3d square = f * transpose(f);
+    const Vec3d own = f * cell.slope[e % 8];
+    for (std::size_t k = 0; k < 8; ++k) {
+      const Vec3<int> at = cell.node[k];
+      const int place = LatticeLevel::place_around({at.x - here.x, at.y - here.y, at.z - here.z});
+      const Vec3d other = f * cell.slope[k];
+      const double a[] = {own.x, own.y, own.z}, b[] = {other.x, other.y, other.z};
+      const double both = source.mu * dot(cell.slope[e % 8], cell.slope[k]);
+      const double hats = more.empty() ? 0 : cell.hat[e % 8] * cell.hat[k];
+      for (int m = 0; m < 9; ++m) {
+        const int r = m / 3, c = m % 3;
+        double value = source.lambda * a[r] * b[c] + source.mu * b[r] * a[c] + both * square(r, c);
+        if (hats > 0) value += hats * more[source.phyxel](r, c);
+        sums[static_cast<std::size_t>(place * 9 + m)] += rounded(by * value);
+      }
+    }
+  }
+}
+
+void BodyLattices::assemble(std::span<const Vec3d> free, std::span<const Mat3d> gradient,
+                            std::span<const Mat3d> more) {
+  LatticeLevel& finest = levels_.front();
+  const double square = finest.lattice().spacing * finest.lattice().spacing;
+  double largest = 0;
+  for (const Source& source : sources_) {
+    Mat3d f = identity<double>();
+    if (!gradient.empty()) f = f + gradient[source.phyxel];
+    // No slope is longer than 2 over the spacing, and no product of F larger than its norm squared.
+    const Mat3d both = f * transpose(f);
+    double one = 4 * (std::abs(source.lambda) + 2 * source.mu) *
+                 (both(0, 0) + both(1, 1) + both(2, 2)) / square;
+    if (!more.empty()) {
+      for (int e = 0; e < 9; ++e) one += std::abs(more[source.phyxel](e / 3, e % 3));
+    }
+    largest = std::max(largest, one);
+  }
+  if (ranks_) largest = ranks_->largest(largest);
+  const double by = largest > 0 ? std::ldexp(1, 61) / (largest * most_) : 1;
+  const std::vector<Vec3d> free_axes = free_nodes(free);
+  constexpr Index chunk = 4096;
+  std::vector<std::int64_t> sums;
+  for (Index begin = 0; begin < finest.size(); begin += chunk) {
+    const Index end = std::min(finest.size(), begin + chunk);
+    sums.assign(static_cast<std::size_t>(end - begin) * numbers, 0);
+#pragma omp parallel for schedule(dynamic, 64)
+    for (Index a = begin; a < end; ++a) {
+      const auto at = static_cast<std::size_t>(a - begin) * numbers;
+      add_terms(a, gradient, more, by, std::span(sums).subspan(at, numbers));
+    }
+    add_over_ranks(sums);
+#pragma omp parallel for schedule(static)
+    for (Index a = begin; a < end; ++a) {
+      const std::int64_t* own = sums.data() + static_cast<std::size_t>(a - begin) * numbers;
+      for (int k = 0; k < LatticeLevel::around; ++k, own += 9) {
+        const Index b = finest.near(a, k);
+        if (b < 0) continue;
+        Mat3d block;
+        for (int e = 0; e < 9; ++e) block(e / 3, e % 3) = static_cast<double>(own[e]) / by;
+        finest.set_block(a, k, masked(block, free_axes[a], free_axes[b]));
+      }
+    }
+  }
+}
+
+/// Sets the stiffness of the next coarser level.
+void BodyLattices::coarsen(std::size_t level) {
+  const LatticeLevel& fine = levels_[level];
+  LatticeLevel& coarse = levels_[level + 1];
+  const Transfer& transfer = transfers_[level];
+#pragma omp parallel for schedule(dynamic, 64)
+  for (Index a = 0; a < coarse.size(); ++a) {
+    const Vec3<int> here = coarse.node(a);
+    std::array<Mat3d, LatticeLevel::around> sum{};
+    for (Offset c = transfer.child_start[a]; c < transfer.child_start[a + 1]; ++c) {
+      const auto [i, of_child] = transfer.children[c];
+      for (int k = 0; k < LatticeLevel::around; ++k) {
+        const Index j = fine.near(i, k);
+        if (j < 0) continue;
+        const Mat3d block = of_child * fine.block(i, k);
+        for (Offset p = transfer.parent_start[j]; p < transfer.parent_start[j + 1]; ++p) {
+          const auto [b, of_parent] = transfer.parents[p];
+          const Vec3<int> at = coarse.node(b);
+          const int place =
+              LatticeLevel::place_around({at.x - here.x, at.y - here.y, at.z - here.z});
+          sum[static_cast<std::size_t>(place)] += of_parent * block;
+        }
+      }
+    }
+    for (int k = 0; k < LatticeLevel::around; ++k) {
+      coarse.set_block(a, k, sum[static_cast<std::size_t>(k)]);
+    }
+  }
+}
+
+/// Factors the coarsest stiffness. What nothing holds gets a little stiffness.
+void BodyLattices::factor() {
+  const LatticeLevel& level = levels_.back();
+  const Eigen::Index n = 3 * static_cast<Eigen::Index>(level.size());
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(n, n);
+  for (Index a = 0; a < level.size(); ++a) {
+    for (int k = 0; k < LatticeLevel::around; ++k) {
+      const Index b = level.near(a, k);
+      if (b < 0) continue;
+      const Mat3d block = level.block(a, k);
+      for (int e = 0; e < 9; ++e) all(3 * a + e / 3, 3 * b + e % 3) = block(e / 3, e % 3);
+    }
+  }
+  const double most = all.diagonal().maxCoeff();
+  constexpr double little = 1e-6;  // above the rounding of blocks in float
+  for (Eigen::Index r = 0; r < n; ++r) {
+    all(r, r) += all(r, r) > little * most ? little * all(r, r) : std::max(most, 1e-300);
+  }
+  const Eigen::LLT<Eigen::MatrixXd> cholesky(all);
+  const Eigen::MatrixXd lower = cholesky.matrixL();
+  factor_.assign(lower.data(), lower.data() + lower.size());
+}
+
+void BodyLattices::solve_coarsest() {
+  const Eigen::Index n = 3 * static_cast<Eigen::Index>(levels_.back().size());
+  const Eigen::Map<const Eigen::MatrixXd> lower(factor_.data(), n, n);
+  left_.back() = right_.back();
+  Eigen::Map<Eigen::VectorXd> x(&left_.back().data()->x, n);
+  lower.triangularView<Eigen::Lower>().solveInPlace(x);
+  lower.transpose().triangularView<Eigen::Upper>().solveInPlace(x);
+}
+
+void BodyLattices::cycle(std::size_t level) {
+  if (level + 1 == levels_.size()) return solve_coarsest();
+  const LatticeLevel& fine = levels_[level];
+  const Transfer& transfer = transfers_[level];
+  Nodes &right = right_[level], &left = left_[level], &down = right_[level + 1];
+  const auto find_rest = [&] {
+    fine.product(left, rest_);
+#pragma omp parallel for schedule(static) if (fine.size() > worth_threads)
+    for (Index a = 0; a < fine.size(); ++a) rest_[a] = right[a] - rest_[a];
+  };
+  fine.smooth(right, left);
+  find_rest();
+  down.resize(static_cast<std::size_t>(levels_[level + 1].size()));
+#pragma omp parallel for schedule(static) if (fine.size() > worth_threads)
+  for (Index a = 0; a < levels_[level + 1].size(); ++a) {
+    Vec3d sum;
+    for (Offset c = transfer.child_start[a]; c < transfer.child_start[a + 1]; ++c) {
+      sum += transfer.children[c].weight * rest_[transfer.children[c].node];
+    }
+    down[a] = sum;
+  }
+  levels_[level + 1].restrict_to_free(down);
+  cycle(level + 1);
+  const Nodes& up = left_[level + 1];
+  rest_.assign(left.size(), {});
+#pragma omp parallel for schedule(static) if (fine.size() > worth_threads)
+  for (Index a = 0; a < fine.size(); ++a) {
+    for (Offset p = transfer.parent_start[a]; p < transfer.parent_start[a + 1]; ++p) {
+      rest_[a] += transfer.parents[p].weight * up[transfer.parents[p].node];
+    }
+  }
+  fine.restrict_to_free(rest_);
+  for (std::size_t a = 0; a < left.size(); ++a) left[a] += rest_[a];
+  find_rest();
+  fine.smooth(rest_, more_);
+  for (std::size_t a = 0; a < left.size(); ++a) left[a] += more_[a];
+}
+
+void BodyLattices::gather(std::span<const Vec3d> free, std::span<const Vec3d> r, double by,
+                          std::span<std::int64_t> sums) {
+  rounded_.resize(sources_.size());
+#pragma omp parallel for schedule(static) if (sources_.size() > worth_threads)
+  for (std::size_t p = 0; p < sources_.size(); ++p) {
+    const Index i = sources_[p].phyxel;
+    rounded_[p] = {std::rint(by * free[i].x * r[i].x), std::rint(by * free[i].y * r[i].y),
+                   std::rint(by * free[i].z * r[i].z)};
+  }
+  const Index nodes = levels_.front().size();
+#pragma omp parallel for schedule(static) if (nodes > worth_threads)
+  for (Index a = 0; a < nodes; ++a) {
+    Vec3d sum;
+    for (Offset n = entry_start_[a]; n < entry_start_[a + 1]; ++n) {
+      const auto e = static_cast<std::size_t>(entry_[n]);
+      sum += (whole_hat * static_cast<double>(hat_[e])) * rounded_[e / 8];
+    }
+    const auto at = 3 * static_cast<std::size_t>(a);
+    sums[at] = static_cast<std::int64_t>(sum.x);
+    sums[at + 1] = static_cast<std::int64_t>(sum.y);
+    sums[at + 2] = static_cast<std::int64_t>(sum.z);
+  }
+}
+
+void BodyLattices::correct(std::span<const std::int64_t> sums, double by,
+                           std::span<const Vec3d> free, std::span<Vec3d> x) {
+  Nodes& right = right_.front();
+  right.resize(static_cast<std::size_t>(levels_.front().size()));
+  for (std::size_t a = 0; a < right.size(); ++a) {
+    const auto value = [&](std::size_t axis) {
+      return static_cast<double>(sums[3 * a + axis]) / (whole_hat * by);
+    };
+    right[a] = {value(0), value(1), value(2)};
+  }
+  levels_.front().restrict_to_free(right);
+  cycle(0);
+  Nodes& left = left_.front();
+  levels_.front().restrict_to_free(left);
+#pragma omp parallel for schedule(static) if (left.size() > worth_threads)
+  for (std::size_t p = 0; p < sources_.size(); ++p) {
+    Vec3d sum;
+    for (int k = 0; k < 8; ++k) {
+      sum += static_cast<double>(hat_[8 * p + k]) * left[node_[8 * p + k]];
+    }
+    const Index i = sources_[p].phyxel;
+    x[i] += Vec3d{free[i].x * sum.x, free[i].y * sum.y, free[i].z * sum.z};
+  }
+}
+
+}  // namespace phyxel

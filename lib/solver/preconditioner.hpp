@@ -1,0 +1,55 @@
+/// The preconditioner of the linear equations of Newton's method.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "model/owned_vectors.hpp"
+#include "phyxel/model.hpp"
+#include "solver/body_lattices.hpp"
+
+namespace phyxel {
+
+/// An approximate inverse of the stiffness of a model: that of each phyxel alone, for what is
+/// rough, and lattices behind each body, for what is smooth,
+///
+///   z = B⁻¹ r + Σ P (V-cycle) Pᵀ r,
+///
+/// where P takes the displacements of nodes to phyxels. Conjugate gradients then need about as many
+/// iterations for many phyxels as for few. The first part is that of small strains at rest, with
+/// inertia and contact; the second one turns with the body.
+class Preconditioner {
+ public:
+  using Vector = OwnedVectors::Vector;
+  /// Stiffness that contact adds to phyxels of this rank [N/m].
+  using Blocks = std::map<Index, Mat3d>;
+
+  /// Collective on a share. All arguments must outlive this.
+  Preconditioner(const Model& model, const OwnedVectors& vectors);
+
+  /// Sets what adds to elasticity. Collective on a share.
+  /// @param free 1 along free axes, 0 along others, shape [n]
+  /// @param weight inertia of phyxels [kg/s²], shape [n] or empty
+  /// @param contact blocks of phyxels in contact
+  /// @param gradient of displacement, shape [n]; empty: small
+  void set(const Vector& free, std::span<const double> weight, const Blocks& contact,
+           std::vector<Mat3d> gradient);
+
+  /// z = M⁻¹ r. Collective on a share.
+  void apply(const Vector& r, Vector& z);
+
+ private:
+  const Model& model_;
+  const OwnedVectors& vectors_;
+  Vector free_;
+  std::vector<double> weight_;
+  Blocks contact_;
+  std::vector<Mat3d> gradient_;         // of displacement; empty: at rest
+  std::vector<Mat3d> block_, inverse_;  // of each phyxel
+  std::vector<BodyLattices> lattices_;  // of each body
+  std::vector<std::int64_t> sums_;
+};
+
+}  // namespace phyxel
