@@ -6,17 +6,14 @@
 #include <utility>
 
 #include "rank_exchange.hpp"
+#include "solver/node_lists.hpp"
 
 namespace phyxel {
 namespace {
 
 constexpr Index worth_threads = 2000;  // nodes
 constexpr Index most_coarsest = 100;   // nodes
-constexpr int numbers = LatticeLevel::around * 9;
 constexpr double whole_hat = 1 << 16;  // quanta of a hat of 1
-
-/// The nearest whole number.
-std::int64_t rounded(double x) { return static_cast<std::int64_t>(x + (x < 0 ? -0.5 : 0.5)); }
 
 /// The lattice of twice a spacing in a box.
 Lattice finest_lattice(const Box& box, double spacing) {
@@ -46,26 +43,6 @@ std::vector<std::uint64_t> of_all_ranks(const Communicator* ranks,
   return keys;
 }
 
-/// Lists from pairs of a list and a value, in their order.
-template <class Value>
-void group(std::size_t lists, const std::vector<std::pair<Index, Value>>& pairs,
-           std::vector<Offset>& start, std::vector<Value>& values) {
-  start.assign(lists + 1, 0);
-  for (const auto& [list, value] : pairs) ++start[static_cast<std::size_t>(list) + 1];
-  for (std::size_t k = 0; k < lists; ++k) start[k + 1] += start[k];
-  values.resize(pairs.size());
-  std::vector<Offset> next(start.begin(), start.end() - 1);
-  for (const auto& [list, value] : pairs) values[next[list]++] = value;
-}
-
-/// A block without the rows and columns of axes along which nodes do not move.
-Mat3d masked(const Mat3d& block, Vec3d rows, Vec3d columns) {
-  const double r[] = {rows.x, rows.y, rows.z}, c[] = {columns.x, columns.y, columns.z};
-  Mat3d found;
-  for (int e = 0; e < 9; ++e) found(e / 3, e % 3) = r[e / 3] * c[e % 3] * block(e / 3, e % 3);
-  return found;
-}
-
 }  // namespace
 
 BodyLattices::BodyLattices(const Communicator* ranks, const Box& box, double spacing,
@@ -81,6 +58,7 @@ BodyLattices::BodyLattices(const Communicator* ranks, const Box& box, double spa
   }
   levels_.emplace_back(lattice, of_all_ranks(ranks, std::move(keys)));
   find_entries();
+  find_cells();
   while (levels_.back().size() > most_coarsest) {
     const Index before = levels_.back().size();
     add_level();
@@ -152,114 +130,14 @@ void BodyLattices::add_level() {
   levels_.push_back(std::move(coarse));
 }
 
-void BodyLattices::set(std::span<const Vec3d> free, std::span<const Mat3d> gradient,
-                       std::span<const Mat3d> more) {
-  assemble(free, gradient, more);
+void BodyLattices::set(std::span<const Vec3d> free, const Present& present) {
+  assemble(free, present);
   for (std::size_t l = 0; l + 1 < levels_.size(); ++l) {
     levels_[l].begin();
     coarsen(l);
   }
   levels_.back().begin();
   factor();
-}
-
-/// 1 along the axes along which a node moves: those along which no phyxel near it is held, so that
-/// held ones stay where they are.
-std::vector<Vec3d> BodyLattices::free_nodes(std::span<const Vec3d> free) const {
-  constexpr float counts = 0.01F;  // hat
-  const Index nodes = levels_.front().size();
-  std::vector<std::int64_t> held(3 * static_cast<std::size_t>(nodes), 0);
-  for (std::size_t e = 0; e < node_.size(); ++e) {
-    if (hat_[e] < counts) continue;
-    const Vec3d f = free[sources_[e / 8].phyxel];
-    const auto at = 3 * static_cast<std::size_t>(node_[e]);
-    held[at] += f.x == 0;
-    held[at + 1] += f.y == 0;
-    held[at + 2] += f.z == 0;
-  }
-  add_over_ranks(held);
-  std::vector<Vec3d> found(static_cast<std::size_t>(nodes));
-  for (std::size_t a = 0; a < found.size(); ++a) {
-    const auto is_free = [&](std::size_t axis) { return held[3 * a + axis] == 0 ? 1.0 : 0.0; };
-    found[a] = {is_free(0), is_free(1), is_free(2)};
-  }
-  return found;
-}
-
-/// Adds what the phyxels of this rank near a node give to its blocks, times `by`.
-void BodyLattices::add_terms(Index node, std::span<const Mat3d> gradient,
-                             std::span<const Mat3d> more, double by,
-                             std::span<std::int64_t> sums) const {
-  const Lattice& lattice = levels_.front().lattice();
-  const Vec3<int> here = levels_.front().node(node);
-  for (Offset n = entry_start_[node]; n < entry_start_[node + 1]; ++n) {
-    const auto e = static_cast<std::size_t>(entry_[n]);
-    const Source& source = sources_[e / 8];
-    const LatticeCell cell(lattice, source.place);
-    Mat3d f = identity<double>();
-    if (!gradient.empty()) f = f + gradient[source.phyxel];
-    const Mat3d square = f * transpose(f);
-    const Vec3d own = f * cell.slope[e % 8];
-    for (std::size_t k = 0; k < 8; ++k) {
-      const Vec3<int> at = cell.node[k];
-      const int place = LatticeLevel::place_around({at.x - here.x, at.y - here.y, at.z - here.z});
-      const Vec3d other = f * cell.slope[k];
-      const double a[] = {own.x, own.y, own.z}, b[] = {other.x, other.y, other.z};
-      const double both = source.mu * dot(cell.slope[e % 8], cell.slope[k]);
-      const double hats = more.empty() ? 0 : cell.hat[e % 8] * cell.hat[k];
-      for (int m = 0; m < 9; ++m) {
-        const int r = m / 3, c = m % 3;
-        double value = source.lambda * a[r] * b[c] + source.mu * b[r] * a[c] + both * square(r, c);
-        if (hats > 0) value += hats * more[source.phyxel](r, c);
-        sums[static_cast<std::size_t>(place * 9 + m)] += rounded(by * value);
-      }
-    }
-  }
-}
-
-void BodyLattices::assemble(std::span<const Vec3d> free, std::span<const Mat3d> gradient,
-                            std::span<const Mat3d> more) {
-  LatticeLevel& finest = levels_.front();
-  const double square = finest.lattice().spacing * finest.lattice().spacing;
-  double largest = 0;
-  for (const Source& source : sources_) {
-    Mat3d f = identity<double>();
-    if (!gradient.empty()) f = f + gradient[source.phyxel];
-    // No slope is longer than 2 over the spacing, and no product of F larger than its norm squared.
-    const Mat3d both = f * transpose(f);
-    double one = 4 * (std::abs(source.lambda) + 2 * source.mu) *
-                 (both(0, 0) + both(1, 1) + both(2, 2)) / square;
-    if (!more.empty()) {
-      for (int e = 0; e < 9; ++e) one += std::abs(more[source.phyxel](e / 3, e % 3));
-    }
-    largest = std::max(largest, one);
-  }
-  if (ranks_) largest = ranks_->largest(largest);
-  const double by = largest > 0 ? std::ldexp(1, 61) / (largest * most_) : 1;
-  const std::vector<Vec3d> free_axes = free_nodes(free);
-  constexpr Index chunk = 4096;
-  std::vector<std::int64_t> sums;
-  for (Index begin = 0; begin < finest.size(); begin += chunk) {
-    const Index end = std::min(finest.size(), begin + chunk);
-    sums.assign(static_cast<std::size_t>(end - begin) * numbers, 0);
-#pragma omp parallel for schedule(dynamic, 64)
-    for (Index a = begin; a < end; ++a) {
-      const auto at = static_cast<std::size_t>(a - begin) * numbers;
-      add_terms(a, gradient, more, by, std::span(sums).subspan(at, numbers));
-    }
-    add_over_ranks(sums);
-#pragma omp parallel for schedule(static)
-    for (Index a = begin; a < end; ++a) {
-      const std::int64_t* own = sums.data() + static_cast<std::size_t>(a - begin) * numbers;
-      for (int k = 0; k < LatticeLevel::around; ++k, own += 9) {
-        const Index b = finest.near(a, k);
-        if (b < 0) continue;
-        Mat3d block;
-        for (int e = 0; e < 9; ++e) block(e / 3, e % 3) = static_cast<double>(own[e]) / by;
-        finest.set_block(a, k, masked(block, free_axes[a], free_axes[b]));
-      }
-    }
-  }
 }
 
 /// Sets the stiffness of the next coarser level.

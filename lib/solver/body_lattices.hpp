@@ -1,6 +1,7 @@
 /// The stiffness of a body on nested lattices, which smooth forces are solved for.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -9,6 +10,7 @@
 #include "phyxel/communicator.hpp"
 #include "phyxel/types.hpp"
 #include "solver/lattice_level.hpp"
+#include "solver/yielding.hpp"
 
 namespace phyxel {
 
@@ -17,10 +19,12 @@ namespace phyxel {
 ///
 ///   K_ab = Σ_i v_i [λ F∇N_a (F∇N_b)ᵀ + μ (F∇N_b (F∇N_a)ᵀ + ∇N_a · ∇N_b F Fᵀ)] + N_a N_b C_i,
 ///
-/// with the deformation gradient F of the phyxel, and more stiffness C_i, as by inertia. On coarser
-/// ones it is that of the sums of these hats. A V-cycle with damped Jacobi smoothing solves for it
-/// nearly, exactly on the coarsest. Every rank has all nodes; sums over phyxels are of whole
-/// multiples of a quantum, so that they have the same bits on any number of ranks and threads.
+/// with the deformation gradient F of the phyxel, and more stiffness C_i, as by inertia. Where a
+/// phyxel yields (`Yielding`), the first term is scaled, and v_i (W ∇N_a)(W ∇N_b)ᵀ is subtracted.
+/// On coarser ones it is that of the sums of these hats. A V-cycle with damped Jacobi smoothing
+/// solves for it nearly, exactly on the coarsest. Every rank has all nodes; sums over phyxels are
+/// of whole multiples of a quantum, so that they have the same bits on any number of ranks and
+/// threads.
 class BodyLattices {
  public:
   using Nodes = LatticeLevel::Nodes;
@@ -29,7 +33,15 @@ class BodyLattices {
   struct Source {
     Index phyxel = 0;
     Vec3d place;                ///< At rest [m].
-    double lambda = 0, mu = 0;  ///< Lamé's parameters times its volume [J].
+    double volume = 0;          ///< [m³]
+    double lambda = 0, mu = 0;  ///< Lamé's parameters [Pa].
+  };
+
+  /// What the stiffness depends on. Spans have the shape [n], or are empty.
+  struct Present {
+    std::span<const Mat3d> gradient;     ///< Of displacement; empty: small.
+    std::span<const Yielding> yielding;  ///< Empty: none yields.
+    std::span<const Mat3d> more;         ///< Stiffness C [N/m].
   };
 
   /// Collective on a share. @param ranks null without ranks
@@ -38,10 +50,7 @@ class BodyLattices {
                std::vector<Source> sources);
 
   /// Sets the stiffness. Collective on a share. @param free 1 along free axes, shape [n]
-  /// @param gradient of displacement, shape [n]; empty: at rest
-  /// @param more stiffness C of phyxels [N/m], shape [n]; empty: none
-  void set(std::span<const Vec3d> free, std::span<const Mat3d> gradient,
-           std::span<const Mat3d> more);
+  void set(std::span<const Vec3d> free, const Present& present);
 
   /// From the finest to the coarsest.
   const std::vector<LatticeLevel>& levels() const { return levels_; }
@@ -77,10 +86,11 @@ class BodyLattices {
   void add_level();
   void find_entries();
   std::vector<Vec3d> free_nodes(std::span<const Vec3d> free) const;
-  void assemble(std::span<const Vec3d> free, std::span<const Mat3d> gradient,
-                std::span<const Mat3d> more);
-  void add_terms(Index node, std::span<const Mat3d> gradient, std::span<const Mat3d> more,
-                 double by, std::span<std::int64_t> sums) const;
+  void assemble(std::span<const Vec3d> free, const Present& present);
+  double largest_entry(const Present& present) const;
+  void find_cells();
+  /// Adds up the stiffness of the cells of a layer of the lattice, times `by`.
+  std::vector<double> stiffness_of_cells(int layer, const Present& present, double by) const;
   void coarsen(std::size_t level);
   void factor();
   void solve_coarsest();
@@ -99,6 +109,11 @@ class BodyLattices {
   std::vector<float> hat_;  // whole multiples of a quantum
   std::vector<Offset> entry_start_;
   std::vector<Index> entry_;
+  // Cells of the finest lattice with phyxels of this rank, by their layers along x: their sources
+  // and nodes; and by node, in which cells it is, times 8 plus its place there.
+  std::vector<Offset> layer_start_, source_start_, cell_start_;
+  std::vector<Index> source_, cell_;
+  std::vector<std::array<Index, 8>> cell_node_;
   std::vector<double> factor_;       // of the coarsest stiffness, a lower triangle by columns
   std::vector<Nodes> right_, left_;  // of each level: right sides and solutions
   Nodes rest_, more_;

@@ -137,7 +137,7 @@ double LatticeLevel::largest_eigenvalue() const {
     v[a].z = next();
   }
   double found = 1;
-  constexpr int powers = 12;
+  constexpr int powers = 6;
   for (int k = 0; k < powers; ++k) {
     product(v, image);
     double before = 0, after = 0;
@@ -151,7 +151,7 @@ double LatticeLevel::largest_eigenvalue() const {
     const double scale = 1 / std::sqrt(after);
     for (Vec3d& one : v) one = scale * one;
   }
-  return 1.1 * found;
+  return 1.2 * found;
 }
 
 void LatticeLevel::smooth(const Nodes& r, Nodes& x) const {

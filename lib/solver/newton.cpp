@@ -56,6 +56,8 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       following_(model),
       contact_(model),
       preconditioner_(model, vectors_),
+      may_yield_(std::any_of(model.parts.begin(), model.parts.end(),
+                             [&](const Part& part) { return may_yield(model, part); })),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
 /// The reason to give a search up, or nothing. @param exhausted number of steps in a row whose
@@ -389,14 +391,22 @@ bool Newton::asked_to_stop(int iteration, double inner_residual) {
   return (model_.share ? model_.share->communicator->largest(stop) : stop) > 0;
 }
 
-/// ∇u if it is large, else nothing: the preconditioner depends on u alone, so that a search that
-/// was stopped goes on to the bit.
-std::vector<Mat3d> Newton::present_gradients(const Vector& u) {
+/// Sets the preconditioner for a step from u, on which alone it depends, so that a search that was
+/// stopped goes on to the bit. Gradients count if they are large.
+void Newton::begin_preconditioner(const Balance& balance, const Vector& u) {
   put(u);
   std::vector<Mat3d> gradient;
   backend_.displacement_gradients(gradient);
   ++evaluations_;
-  return largest_entry(gradient) > large_gradient ? gradient : std::vector<Mat3d>();
+  std::vector<Yielding> yielding;
+  if (may_yield_) {
+    State state;
+    backend_.download(state);
+    yielding = present_yielding(model_, gradient, state, host_threads(backend_));
+  }
+  if (!(largest_entry(gradient) > large_gradient)) gradient.clear();
+  preconditioner_.set(balance.free, balance.weight, contact_.held_blocks(), std::move(gradient),
+                      yielding);
 }
 
 /// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by conjugate
@@ -414,7 +424,7 @@ Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const V
   });
 
   Vector way(u.size()), preconditioned(u.size());
-  preconditioner_.set(balance.free, balance.weight, contact_.held_blocks(), present_gradients(u));
+  begin_preconditioner(balance, u);
   preconditioner_.apply(rest, preconditioned);
   vectors_.for_each([&](Index i) { way[i] = preconditioned[i]; });
   double product = vectors_.product(rest, preconditioned);

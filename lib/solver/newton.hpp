@@ -130,7 +130,7 @@ class Newton {
   double residual(const Balance& balance, const Vector& u, const Vector& force) const;
   double steepest(const Vector& step);
   double largest_entry(std::span<const Mat3d> gradient) const;
-  std::vector<Mat3d> present_gradients(const Vector& u);
+  void begin_preconditioner(const Balance& balance, const Vector& u);
   void stiffness_times(const Balance& balance, const Vector& u, const Vector& force,
                        const Vector& v, Vector& out);
   void find_stiffness(const Balance& balance);
@@ -150,6 +150,7 @@ class Newton {
   FollowingLoads following_;
   ContactPenalty contact_;
   Preconditioner preconditioner_;
+  bool may_yield_;
   double difference_;              ///< Largest displacement in differences of forces [m].
   std::vector<double> stiffness_;  ///< Estimate for each phyxel against its neighbours [N/m].
   Vector placed_;

@@ -104,7 +104,7 @@ TEST_F(Program, StopsNewtonsMethodWithACheckpointAndGoesOn) {
     const std::string parts = "parts_" + method;
     write_beam("2");
     // Seconds of work.
-    replace_in_beam("spacing = 0.05", PHYXEL_SANITIZED ? "spacing = 0.025" : "spacing = 0.016");
+    replace_in_beam("spacing = 0.05", PHYXEL_SANITIZED ? "spacing = 0.016" : "spacing = 0.008");
     replace_in_beam("[solver]", "[solver]\nmethod = \"" + method + "\"");
     replace_in_beam("frames_per_second = 50", "frames_per_second = 1");
     if (method == "implicit") replace_in_beam("end = 2", "end = 2\nstep = 1");

@@ -63,12 +63,12 @@ class LatticesOfACube : public ::testing::Test {
     for (int k = 0; k < 512; ++k) {
       const Vec3d at{0.125 * (k / 64) + 0.0625, 0.125 * (k / 8 % 8) + 0.0625,
                      0.125 * (k % 8) + 0.0625};
-      sources_.push_back({k, at, lambda / 512, mu / 512});
+      sources_.push_back({k, at, 1.0 / 512, lambda, mu});
     }
   }
   BodyLattices lattices(std::span<const Mat3d> gradient) const {
     BodyLattices made(nullptr, {{0, 0, 0}, {1, 1, 1}}, 0.125, sources_);
-    made.set(std::vector<Vec3d>(512, {1, 1, 1}), gradient, {});
+    made.set(std::vector<Vec3d>(512, {1, 1, 1}), {gradient, {}, {}});
     return made;
   }
   /// Twice the energy of a displacement a x of the nodes of a level [J].
@@ -143,7 +143,7 @@ TEST(Preconditioner, IsSymmetricAndPositive) {
   };
   for (const Preconditioner::Blocks& contact :
        {Preconditioner::Blocks{}, Preconditioner::Blocks{{500, 1e5 * identity<double>()}}}) {
-    preconditioner.set(free, weight, contact, {});
+    preconditioner.set(free, weight, contact, {}, {});
     for (int k = 0; k < 5; ++k) {
       const std::vector<Vec3d> a = vector(), b = vector();
       std::vector<Vec3d> za(a.size()), zb(a.size());
