@@ -10,7 +10,6 @@
 #include "phyxel/communicator.hpp"
 #include "phyxel/types.hpp"
 #include "solver/lattice_level.hpp"
-#include "solver/yielding.hpp"
 
 namespace phyxel {
 
@@ -19,8 +18,7 @@ namespace phyxel {
 ///
 ///   K_ab = Σ_i v_i [λ F∇N_a (F∇N_b)ᵀ + μ (F∇N_b (F∇N_a)ᵀ + ∇N_a · ∇N_b F Fᵀ)] + N_a N_b C_i,
 ///
-/// with the deformation gradient F of the phyxel, and more stiffness C_i, as by inertia. Where a
-/// phyxel yields (`Yielding`), the first term is scaled, and v_i (W ∇N_a)(W ∇N_b)ᵀ is subtracted.
+/// with the deformation gradient F of the phyxel, and more stiffness C_i, as by inertia.
 /// On coarser ones it is that of the sums of these hats. A V-cycle with damped Jacobi smoothing
 /// solves for it nearly, exactly on the coarsest. Every rank has all nodes; sums over phyxels are
 /// of whole multiples of a quantum, so that they have the same bits on any number of ranks and
@@ -39,9 +37,8 @@ class BodyLattices {
 
   /// What the stiffness depends on. Spans have the shape [n], or are empty.
   struct Present {
-    std::span<const Mat3d> gradient;     ///< Of displacement; empty: small.
-    std::span<const Yielding> yielding;  ///< Empty: none yields.
-    std::span<const Mat3d> more;         ///< Stiffness C [N/m].
+    std::span<const Mat3d> gradient;  ///< Of displacement; empty: small.
+    std::span<const Mat3d> more;      ///< Stiffness C [N/m].
   };
 
   /// Collective on a share. @param ranks null without ranks

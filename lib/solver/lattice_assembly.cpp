@@ -83,32 +83,24 @@ constexpr std::size_t unknowns = 24;  // of a cell
 void add_phyxel(const Lattice& lattice, const BodyLattices::Source& source,
                 const BodyLattices::Present& present, double by, double* cell) {
   const LatticeCell at(lattice, source.place);
-  Mat3d f = identity<double>(), way;
+  Mat3d f = identity<double>();
   if (!present.gradient.empty()) f = f + present.gradient[source.phyxel];
-  double lambda = source.lambda, mu = source.mu;
-  if (!present.yielding.empty()) {
-    const Yielding& yielding = present.yielding[source.phyxel];
-    lambda = yielding.lambda(lambda, mu);
-    mu *= yielding.shear;
-    way = yielding.way;
-  }
   const Mat3d square = f * transpose(f);
-  double x[unknowns], w[unknowns];  // F ∇N and W ∇N
+  double x[unknowns];  // F ∇N
   for (std::size_t a = 0; a < 8; ++a) {
-    const Vec3d turned = f * at.slope[a], soft = way * at.slope[a];
+    const Vec3d turned = f * at.slope[a];
     x[3 * a] = turned.x, x[3 * a + 1] = turned.y, x[3 * a + 2] = turned.z;
-    w[3 * a] = soft.x, w[3 * a + 1] = soft.y, w[3 * a + 2] = soft.z;
   }
-  const double volume = by * source.volume;
+  const double lambda = by * source.volume * source.lambda;
+  const double mu = by * source.volume * source.mu;
   for (std::size_t a = 0; a < 8; ++a) {
     for (std::size_t b = a; b < 8; ++b) {
-      const double both = volume * mu * dot(at.slope[a], at.slope[b]);
+      const double both = mu * dot(at.slope[a], at.slope[b]);
       const double hats = present.more.empty() ? 0 : by * at.hat[a] * at.hat[b];
       for (std::size_t i = 0; i < 3; ++i) {
         for (std::size_t k = 0; k < 3; ++k) {
           const int r = static_cast<int>(i), c = static_cast<int>(k);
-          double value = volume * (lambda * x[3 * a + i] * x[3 * b + k] +
-                                   mu * x[3 * b + i] * x[3 * a + k] - w[3 * a + i] * w[3 * b + k]) +
+          double value = lambda * x[3 * a + i] * x[3 * b + k] + mu * x[3 * b + i] * x[3 * a + k] +
                          both * square(r, c);
           if (hats > 0) value += hats * present.more[source.phyxel](r, c);
           cell[(3 * a + i) * unknowns + 3 * b + k] += std::rint(value);
@@ -142,14 +134,13 @@ double BodyLattices::largest_entry(const Present& present) const {
   for (const Source& source : sources_) {
     Mat3d f = identity<double>();
     if (!present.gradient.empty()) f = f + present.gradient[source.phyxel];
-    double squares = 0, scale = 1, more = 0;
+    double squares = 0, more = 0;
     for (int e = 0; e < 9; ++e) {
       squares += f(e / 3, e % 3) * f(e / 3, e % 3);
       if (!present.more.empty()) more += std::abs(present.more[source.phyxel](e / 3, e % 3));
     }
-    if (!present.yielding.empty()) scale = std::max(1.0, present.yielding[source.phyxel].bulk);
-    // No slope is longer than 2 over the spacing; what flow subtracts is less than the rest.
-    const double moduli = scale * (std::abs(source.lambda) + 6 * source.mu);
+    // No slope is longer than 2 over the spacing.
+    const double moduli = std::abs(source.lambda) + 2 * source.mu;
     largest = std::max(largest, 4 * source.volume * moduli * squares / (spacing * spacing) + more);
   }
   return ranks_ ? ranks_->largest(largest) : largest;

@@ -56,8 +56,6 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       following_(model),
       contact_(model),
       preconditioner_(model, vectors_),
-      may_yield_(std::any_of(model.parts.begin(), model.parts.end(),
-                             [&](const Part& part) { return may_yield(model, part); })),
       difference_(1e-7 * vectors_.smallest_support()) {}
 
 /// The reason to give a search up, or nothing. @param exhausted number of steps in a row whose
@@ -398,15 +396,8 @@ void Newton::begin_preconditioner(const Balance& balance, const Vector& u) {
   std::vector<Mat3d> gradient;
   backend_.displacement_gradients(gradient);
   ++evaluations_;
-  std::vector<Yielding> yielding;
-  if (may_yield_) {
-    State state;
-    backend_.download(state);
-    yielding = present_yielding(model_, gradient, state, host_threads(backend_));
-  }
   if (!(largest_entry(gradient) > large_gradient)) gradient.clear();
-  preconditioner_.set(balance.free, balance.weight, contact_.held_blocks(), std::move(gradient),
-                      yielding);
+  preconditioner_.set(balance.free, balance.weight, contact_.held_blocks(), std::move(gradient));
 }
 
 /// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by conjugate

@@ -150,7 +150,6 @@ class Newton {
   FollowingLoads following_;
   ContactPenalty contact_;
   Preconditioner preconditioner_;
-  bool may_yield_;
   double difference_;              ///< Largest displacement in differences of forces [m].
   std::vector<double> stiffness_;  ///< Estimate for each phyxel against its neighbours [N/m].
   Vector placed_;

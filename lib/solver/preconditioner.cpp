@@ -52,10 +52,7 @@ Mat3d inverse_on(Vec3d free, const Mat3d& block) {
 }  // namespace
 
 Preconditioner::Preconditioner(const Model& model, const OwnedVectors& vectors)
-    : model_(model), vectors_(vectors) {
-  const bool yields = std::any_of(model.parts.begin(), model.parts.end(),
-                                  [&](const Part& part) { return may_yield(model, part); });
-  block_ = stiffness_blocks(model, vectors, yields ? &outer_ : nullptr);
+    : model_(model), vectors_(vectors), block_(stiffness_blocks(model, vectors)) {
   const std::vector<Box> boxes = boxes_of_bodies(model);
   std::vector<double> volume(boxes.size()), size(boxes.size());
   std::vector<std::vector<BodyLattices::Source>> sources(boxes.size());
@@ -76,21 +73,10 @@ Preconditioner::Preconditioner(const Model& model, const OwnedVectors& vectors)
   sums_.resize(all);
 }
 
-/// The block of a phyxel that yields.
-Mat3d Preconditioner::block_of(const LameParameters& lame, Index i,
-                               const Yielding& yielding) const {
-  const Mat3d& outer = outer_[i];
-  const double size = outer(0, 0) + outer(1, 1) + outer(2, 2);
-  const double lambda = yielding.lambda(lame.lambda, lame.mu) - lame.lambda;
-  const double mu = (yielding.shear - 1) * lame.mu;
-  return block_[i] + (lambda + mu) * outer + (mu * size) * identity<double>() -
-         yielding.way * outer * transpose(yielding.way);
-}
-
 void Preconditioner::set(const Vector& free, std::span<const double> weight, const Blocks& contact,
-                         std::vector<Mat3d> gradient, std::span<const Yielding> yielding) {
+                         std::vector<Mat3d> gradient) {
   const bool is_same = !inverse_.empty() && gradient.empty() && gradient_.empty() &&
-                       yielding.empty() && free == free_ && contact.empty() && contact_.empty() &&
+                       free == free_ && contact.empty() && contact_.empty() &&
                        weight.size() == weight_.size() &&
                        std::equal(weight.begin(), weight.end(), weight_.begin(), weight_.end());
   const double changes = is_same ? 0 : 1;
@@ -109,16 +95,10 @@ void Preconditioner::set(const Vector& free, std::span<const double> weight, con
   }
   for (const auto& [i, block] : contact) more[i] += block;
   inverse_.resize(block_.size());
-  for (const Part& part : model_.parts) {
-    const bool yields = !yielding.empty() && may_yield(model_, part);
-    const LameParameters lame = small_strain_parameters(part);
-#pragma omp parallel for schedule(static)
-    for (Index i = part.begin; i < part.owned_end(); ++i) {
-      const Mat3d block = yields ? block_of(lame, i, yielding[i]) : block_[i];
-      inverse_[i] = inverse_on(free[i], more.empty() ? block : block + more[i]);
-    }
-  }
-  for (BodyLattices& one : lattices_) one.set(free, {gradient_, yielding, more});
+  vectors_.for_each([&](Index i) {
+    inverse_[i] = inverse_on(free[i], more.empty() ? block_[i] : block_[i] + more[i]);
+  });
+  for (BodyLattices& one : lattices_) one.set(free, {gradient_, more});
 }
 
 void Preconditioner::apply(const Vector& r, Vector& z) {

@@ -19,7 +19,7 @@ namespace phyxel {
 ///
 /// where P takes the displacements of nodes to phyxels. Conjugate gradients then need about as many
 /// iterations for many phyxels as for few. The first part is that of small strains at rest, with
-/// inertia and contact; the second one turns with the body. Both know where it yields.
+/// inertia and contact; the second one turns with the body.
 class Preconditioner {
  public:
   using Vector = OwnedVectors::Vector;
@@ -34,23 +34,19 @@ class Preconditioner {
   /// @param weight inertia of phyxels [kg/s²], shape [n] or empty
   /// @param contact blocks of phyxels in contact
   /// @param gradient of displacement, shape [n]; empty: small
-  /// @param yielding of phyxels, shape [n]; empty: none yields
   void set(const Vector& free, std::span<const double> weight, const Blocks& contact,
-           std::vector<Mat3d> gradient, std::span<const Yielding> yielding);
+           std::vector<Mat3d> gradient);
 
   /// z = M⁻¹ r. Collective on a share.
   void apply(const Vector& r, Vector& z);
 
  private:
-  Mat3d block_of(const LameParameters& lame, Index i, const Yielding& yielding) const;
-
   const Model& model_;
   const OwnedVectors& vectors_;
   Vector free_;
   std::vector<double> weight_;
   Blocks contact_;
   std::vector<Mat3d> gradient_;         // of displacement; empty: at rest
-  std::vector<Mat3d> outer_;            // as of `stiffness_blocks`; empty if nothing may yield
   std::vector<Mat3d> block_, inverse_;  // of each phyxel
   std::vector<BodyLattices> lattices_;  // of each body
   std::vector<std::int64_t> sums_;

@@ -6,8 +6,8 @@
 #include "model/parts.hpp"
 #include "model/row_weights.hpp"
 #include "phyxel/law_table.hpp"
+#include "phyxel/physics/hooke.hpp"
 #include "solver/hourglass.hpp"
-#include "solver/yielding.hpp"
 
 namespace phyxel {
 namespace {
@@ -16,7 +16,6 @@ namespace {
 struct Giver {
   Sym3d back;                 // A⁻¹
   Vec3d offset;               // b
-  double volume = 0;          // [m³]
   double lambda = 0, mu = 0;  // times its volume [J]
 };
 
@@ -26,22 +25,18 @@ std::vector<Giver> givers_of(const Model& model, const OwnedVectors& vectors) {
     const LameParameters lame = small_strain_parameters(part);
     for (Index i = part.begin; i < part.owned_end(); ++i) {
       const double v = model.volume[i];
-      givers[i] = {model.inverse_moment[i], model.moment_offset[i], v, v * lame.lambda,
-                   v * lame.mu};
+      givers[i] = {model.inverse_moment[i], model.moment_offset[i], v * lame.lambda, v * lame.mu};
     }
   }
   vectors.refresh_ghosts(givers);
   return givers;
 }
 
-/// Adds v [(λ + μ) g gᵀ + μ |g|² 1], and v g gᵀ if that is asked for.
-void add_outer(const Giver& giver, Vec3d g, Mat3d& block, Mat3d* outer) {
+/// Adds v [(λ + μ) g gᵀ + μ |g|² 1].
+void add_outer(const Giver& giver, Vec3d g, Mat3d& block) {
   const double all[] = {g.x, g.y, g.z}, square = giver.mu * dot(g, g);
   for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      block(r, c) += (giver.lambda + giver.mu) * all[r] * all[c];
-      if (outer) (*outer)(r, c) += giver.volume * all[r] * all[c];
-    }
+    for (int c = 0; c < 3; ++c) block(r, c) += (giver.lambda + giver.mu) * all[r] * all[c];
     block(r, r) += square;
   }
 }
@@ -56,25 +51,27 @@ double estimate(const Model& model, const Part& part, Index i) {
 
 }  // namespace
 
-std::vector<Mat3d> stiffness_blocks(const Model& model, const OwnedVectors& vectors,
-                                    std::vector<Mat3d>* outer) {
+LameParameters small_strain_parameters(const Part& part) {
+  const Material& material = part.material;
+  if (material.young > 0) return {material.lame_lambda(), material.lame_mu()};
+  constexpr double poisson = 0.25;
+  const double young = hourglass_modulus(material);
+  return {lame_lambda(young, poisson), lame_mu(young, poisson)};
+}
+
+std::vector<Mat3d> stiffness_blocks(const Model& model, const OwnedVectors& vectors) {
   std::vector<Mat3d> blocks(static_cast<std::size_t>(model.size()));
-  if (outer) outer->assign(blocks.size(), {});
   const bool has_lists = model.has_lists();
   std::vector<Giver> givers;
   if (has_lists) givers = givers_of(model, vectors);
   for (const Part& part : model.parts) {
     const double kappa = hourglass_stiffness(model, part);
-    const double part_modulus = small_strain_parameters(part).mu;
 #pragma omp parallel for schedule(static)
     for (Index i = part.begin; i < part.owned_end(); ++i) {
       Mat3d& block = blocks[i];
       const double guess = estimate(model, part, i);
-      Mat3d* const own_outer = outer ? &(*outer)[i] : nullptr;
       if (!has_lists) {
         block = guess * identity<double>();
-        // What would give the block with λ = μ.
-        if (outer) *own_outer = guess / (5 * part_modulus) * identity<double>();
         continue;
       }
       // In the order of the whole model, so that sums do not depend on ranks.
@@ -85,14 +82,14 @@ std::vector<Mat3d> stiffness_blocks(const Model& model, const OwnedVectors& vect
                   [&](Index a, Index b) { return model.global_id(a) < model.global_id(b); });
       }
       const Vec3d own = -(givers[i].back * givers[i].offset);
-      add_outer(givers[i], own, block, own_outer);
+      add_outer(givers[i], own, block);
       double weights = 0, known = dot(own, -givers[i].offset);
       for (const Index k : order) {
         const Vec3d x = model.position[i] - model.position[k];
         const RowWeights weight_of(model.neighbourhood.support.data(), k, part.pair_length);
         const double w = weight_of(i, dot(x, x));
         const Vec3d g = w * (givers[k].back * x);
-        add_outer(givers[k], g, block, own_outer);
+        add_outer(givers[k], g, block);
         weights += w;
         known += w * dot(g, x);
       }

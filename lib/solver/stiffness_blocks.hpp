@@ -8,6 +8,13 @@
 
 namespace phyxel {
 
+/// Lamé's parameters of a part at small strains [Pa]; of laws that are not isotropic, those of an
+/// isotropic one of like stiffness.
+struct LameParameters {
+  double lambda = 0, mu = 0;
+};
+LameParameters small_strain_parameters(const Part& part);
+
 /// The stiffness of each phyxel of this rank against all others at rest [N/m], shape [n]: with
 /// g_ki = ∂∇u_k/∂u_i,
 ///
@@ -15,8 +22,6 @@ namespace phyxel {
 ///
 /// k over the phyxel and those that have it as a neighbour; without closing. Where a device has the
 /// lists, an estimate. Collective on a share.
-/// @param outer receives Σ_k v_k g gᵀ [m], shape [n], if not null
-std::vector<Mat3d> stiffness_blocks(const Model& model, const OwnedVectors& vectors,
-                                    std::vector<Mat3d>* outer = nullptr);
+std::vector<Mat3d> stiffness_blocks(const Model& model, const OwnedVectors& vectors);
 
 }  // namespace phyxel

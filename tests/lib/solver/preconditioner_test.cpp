@@ -30,6 +30,12 @@ Model bar(int across, const std::string& keys, const std::string& more = "",
       "scene.toml"));
 }
 
+/// The outcome of a search for rest.
+Equilibrium rest_of(const Model& model) {
+  const auto backend = make_cpu_backend(model, Precision::double_, 0);
+  return find_equilibrium(model, *backend, {});
+}
+
 TEST(StiffnessBlocks, AreDifferencesOfForces) {
   for (const std::string cloud : {"closure = 0\n", "closure = 0\njitter = 0.2\nseed = 2\n"}) {
     for (const double hourglass : {0.0, 0.3}) {
@@ -68,7 +74,7 @@ class LatticesOfACube : public ::testing::Test {
   }
   BodyLattices lattices(std::span<const Mat3d> gradient) const {
     BodyLattices made(nullptr, {{0, 0, 0}, {1, 1, 1}}, 0.125, sources_);
-    made.set(std::vector<Vec3d>(512, {1, 1, 1}), {gradient, {}, {}});
+    made.set(std::vector<Vec3d>(512, {1, 1, 1}), {gradient, {}});
     return made;
   }
   /// Twice the energy of a displacement a x of the nodes of a level [J].
@@ -143,7 +149,7 @@ TEST(Preconditioner, IsSymmetricAndPositive) {
   };
   for (const Preconditioner::Blocks& contact :
        {Preconditioner::Blocks{}, Preconditioner::Blocks{{500, 1e5 * identity<double>()}}}) {
-    preconditioner.set(free, weight, contact, {}, {});
+    preconditioner.set(free, weight, contact, {});
     for (int k = 0; k < 5; ++k) {
       const std::vector<Vec3d> a = vector(), b = vector();
       std::vector<Vec3d> za(a.size()), zb(a.size());
@@ -156,12 +162,6 @@ TEST(Preconditioner, IsSymmetricAndPositive) {
       EXPECT_EQ(za[700].y, 0);
     }
   }
-}
-
-/// Evaluations of a search for rest.
-Equilibrium rest_of(const Model& model) {
-  const auto backend = make_cpu_backend(model, Precision::double_, 0);
-  return find_equilibrium(model, *backend, {});
 }
 
 TEST(Preconditioner, MakesEvaluationsIndependentOfSize) {
