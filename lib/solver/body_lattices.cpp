@@ -43,6 +43,9 @@ std::vector<std::uint64_t> of_all_ranks(const Communicator* ranks,
   return keys;
 }
 
+/// The product of components.
+Vec3d by_axis(Vec3d a, Vec3d b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+
 }  // namespace
 
 BodyLattices::BodyLattices(const Communicator* ranks, const Box& box, double spacing,
@@ -83,6 +86,10 @@ void BodyLattices::find_entries() {
       node_[8 * p + k] = finest.number(cell.node[k]);
       hat_[8 * p + k] = static_cast<float>(std::round(whole_hat * cell.hat[k]) / whole_hat);
     }
+    float* const own = &hat_[8 * p];
+    float sum = 0;
+    for (int k = 0; k < 8; ++k) sum += own[k];
+    *std::max_element(own, own + 8) += 1 - sum;
   }
   std::vector<std::pair<Index, Index>> pairs;
   pairs.reserve(node_.size());
@@ -264,15 +271,32 @@ void BodyLattices::gather(std::span<const Vec3d> free, std::span<const Vec3d> r,
   }
 }
 
-void BodyLattices::correct(std::span<const std::int64_t> sums, double by,
+BodyLattices::Nodes BodyLattices::at_nodes(std::span<const std::int64_t> sums, double by) const {
+  Nodes values(static_cast<std::size_t>(levels_.front().size()));
+  const double scale = 1 / (whole_hat * by);
+  for (std::size_t a = 0; a < values.size(); ++a) {
+    const auto value = [&](std::size_t axis) {
+      return scale * static_cast<double>(sums[3 * a + axis]);
+    };
+    values[a] = {value(0), value(1), value(2)};
+  }
+  return values;
+}
+
+Vec3d BodyLattices::total(std::span<const std::int64_t> sums, double by) const {
+  std::int64_t all[3] = {0, 0, 0};
+  for (std::size_t k = 0; k < sums.size(); ++k) all[k % 3] += sums[k];
+  const double scale = 1 / (whole_hat * by);
+  return {scale * static_cast<double>(all[0]), scale * static_cast<double>(all[1]),
+          scale * static_cast<double>(all[2])};
+}
+
+void BodyLattices::correct(std::span<const std::int64_t> sums, double by, Vec3d mean,
                            std::span<const Vec3d> free, std::span<Vec3d> x) {
   Nodes& right = right_.front();
-  right.resize(static_cast<std::size_t>(levels_.front().size()));
-  for (std::size_t a = 0; a < right.size(); ++a) {
-    const auto value = [&](std::size_t axis) {
-      return static_cast<double>(sums[3 * a + axis]) / (whole_hat * by);
-    };
-    right[a] = {value(0), value(1), value(2)};
+  right = at_nodes(sums, by);
+  if (mean != Vec3d{}) {
+    for (std::size_t a = 0; a < right.size(); ++a) right[a] -= by_axis(shares_[a], mean);
   }
   levels_.front().restrict_to_free(right);
   cycle(0);

@@ -63,10 +63,14 @@ class BodyLattices {
   /// @param by values of r times it are rounded to whole numbers, whose sums in double are exact
   void gather(std::span<const Vec3d> free, std::span<const Vec3d> r, double by,
               std::span<std::int64_t> sums);
-  /// Solves for sums of all ranks, and adds the solution to x at the phyxels of this rank.
-  /// @param by as of `gather`
-  void correct(std::span<const std::int64_t> sums, double by, std::span<const Vec3d> free,
-               std::span<Vec3d> x);
+  /// The sum of r, from the sums of all ranks. @param by as of `gather`
+  Vec3d total(std::span<const std::int64_t> sums, double by) const;
+  /// Sets the sums of the shares of phyxels in the motion of the whole body, of all ranks.
+  void set_shares(std::span<const std::int64_t> sums, double by) { shares_ = at_nodes(sums, by); }
+  /// Solves for r - share times mean, and adds the solution to x at the phyxels of this rank.
+  /// @param sums of r, of all ranks. @param by as of `gather`
+  void correct(std::span<const std::int64_t> sums, double by, Vec3d mean,
+               std::span<const Vec3d> free, std::span<Vec3d> x);
 
  private:
   /// The nodes of a level in terms of the next coarser one.
@@ -80,6 +84,7 @@ class BodyLattices {
     std::vector<Term> children;  ///< Of each coarse node.
   };
 
+  Nodes at_nodes(std::span<const std::int64_t> sums, double by) const;
   void add_level();
   void find_entries();
   std::vector<Vec3d> free_nodes(std::span<const Vec3d> free) const;
@@ -103,7 +108,7 @@ class BodyLattices {
   std::vector<Transfer> transfers_;   // between each and the next
   // Of each source: its nodes and their hats, shape [sources, 8]; and by node, which these are.
   std::vector<Index> node_;
-  std::vector<float> hat_;  // whole multiples of a quantum
+  std::vector<float> hat_;  // whole multiples of a quantum, of each source 1 in all
   std::vector<Offset> entry_start_;
   std::vector<Index> entry_;
   // Cells of the finest lattice with phyxels of this rank, by their layers along x: their sources
@@ -113,7 +118,7 @@ class BodyLattices {
   std::vector<std::array<Index, 8>> cell_node_;
   std::vector<double> factor_;       // of the coarsest stiffness, a lower triangle by columns
   std::vector<Nodes> right_, left_;  // of each level: right sides and solutions
-  Nodes rest_, more_;
+  Nodes rest_, more_, shares_;
   std::vector<Vec3d> rounded_;  // r of each source
 };
 

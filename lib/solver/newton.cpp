@@ -16,7 +16,10 @@ namespace {
 
 constexpr double largest_strain = 0.3;  // largest change of strain in one step
 constexpr int most_cuts = 8;
-constexpr double inner_tolerance = 1e-3;
+// Linear equations are solved to this share of the residual, within limits: more would be lost
+// where forces are far from linear.
+constexpr double inner_tolerance_of_contact = 1e-3;
+constexpr double inner_share = 0.3, least_inner = 0.01, most_inner_tolerance = 0.1;
 constexpr double large_gradient = 0.05;  // of u, which the preconditioner has to know
 constexpr int most_inner = 50'000;
 // Limit of conjugate gradient iterations per unknown; in exact arithmetic one per unknown suffices.
@@ -421,7 +424,10 @@ Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const V
   double product = vectors_.product(rest, preconditioned);
   const double start = product;
   const int most = most_inner_here();
-  for (int k = 0; product > inner_tolerance * inner_tolerance * start; ++k) {
+  const double enough = contact_.empty() ? std::clamp(inner_share * progress_.residual, least_inner,
+                                                      most_inner_tolerance)
+                                         : inner_tolerance_of_contact;
+  for (int k = 0; product > enough * enough * start; ++k) {
     if (k == most) return Inner::exhausted;
     stiffness_times(balance, u, force, way, image);
     if (asked_to_stop(k + 1, std::sqrt(product / start))) return Inner::interrupted;

@@ -7,6 +7,9 @@
 #include "model/contact_groups.hpp"
 #include "model/parts.hpp"
 #include "rank_exchange.hpp"
+#include "rank_sums.hpp"
+#include "solver/boundary_conditions.hpp"
+#include "solver/step_sums.hpp"
 #include "solver/stiffness_blocks.hpp"
 
 namespace phyxel {
@@ -38,6 +41,7 @@ std::vector<Box> boxes_of_bodies(const Model& model) {
 Mat3d inverse_on(Vec3d free, const Mat3d& block) {
   const double of_axis[] = {free.x, free.y, free.z};
   Eigen::Matrix3d all = Eigen::Matrix3d::Identity();
+  if (!(block(0, 0) + block(1, 1) + block(2, 2) > 0)) return {};  // nothing resists
   for (int e = 0; e < 9; ++e) {
     if (of_axis[e / 3] * of_axis[e % 3] > 0) all(e / 3, e % 3) = block(e / 3, e % 3);
   }
@@ -45,6 +49,32 @@ Mat3d inverse_on(Vec3d free, const Mat3d& block) {
   Mat3d found;
   for (int e = 0; e < 9; ++e) {
     found(e / 3, e % 3) = of_axis[e / 3] * of_axis[e % 3] * inverse(e / 3, e % 3);
+  }
+  return found;
+}
+
+double largest_component(const OwnedVectors& vectors, const std::vector<Vec3d>& v) {
+  return vectors.largest([&](Index i) {
+    return std::max({std::abs(v[i].x), std::abs(v[i].y), std::abs(v[i].z)});
+  });
+}
+
+/// The pseudo-inverse on some axes. @param least share of the largest eigenvalue below which others
+/// count as 0
+Mat3d pseudo_inverse_on(Vec3d axes, const Mat3d& matrix, double least) {
+  const double of_axis[] = {axes.x, axes.y, axes.z};
+  Eigen::Matrix3d all;
+  for (int e = 0; e < 9; ++e) {
+    all(e / 3, e % 3) = of_axis[e / 3] * of_axis[e % 3] * matrix(e / 3, e % 3);
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(all);
+  const double largest = solver.eigenvalues().maxCoeff();
+  Mat3d found;
+  for (int k = 0; k < 3; ++k) {
+    const double value = solver.eigenvalues()[k];
+    if (!(value > least * largest) || !(value > 0)) continue;
+    const Eigen::Vector3d way = solver.eigenvectors().col(k);
+    for (int e = 0; e < 9; ++e) found(e / 3, e % 3) += way[e / 3] * way[e % 3] / value;
   }
   return found;
 }
@@ -98,29 +128,125 @@ void Preconditioner::set(const Vector& free, std::span<const double> weight, con
   vectors_.for_each([&](Index i) {
     inverse_[i] = inverse_on(free[i], more.empty() ? block_[i] : block_[i] + more[i]);
   });
-  for (BodyLattices& one : lattices_) one.set(free, {gradient_, more});
+  find_wholes(more);
+  if (any_loose_) {
+    Vector shares = vectors_.make();
+    vectors_.for_each([&](Index i) { shares[i] = share_of(i) * Vec3d{1, 1, 1}; });
+    double by = 1;
+    const auto sums = gathered(shares, largest_component(vectors_, shares), by);
+    for (std::size_t b = 0; b < lattices_.size(); ++b) lattices_[b].set_shares(sums[b], by);
+  }
+  for (std::size_t b = 0; b < lattices_.size(); ++b) {
+    if (wholes_[b].is_light) lattices_[b].set(free, {gradient_, more});
+  }
 }
 
-void Preconditioner::apply(const Vector& r, Vector& z) {
-  const double largest = vectors_.largest([&](Index i) {
-    return std::max({std::abs(r[i].x), std::abs(r[i].y), std::abs(r[i].z)});
-  });
-  vectors_.for_each([&](Index i) { z[i] = inverse_[i] * r[i]; });
-  if (!(largest > 0)) return;
+/// Finds what holds each body, and its inertia. @param more stiffness by inertia and contact
+void Preconditioner::find_wholes(std::span<const Mat3d> more) {
+  enum Term { held, stiffness = 3, inertia = 12, elastic, count, terms };
+  StepSums sums(terms * lattices_.size());
+  for (const Part& part : model_.parts) {
+    ExactSum* const own = &sums[terms * static_cast<std::size_t>(part.body)];
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      const double free[] = {free_[i].x, free_[i].y, free_[i].z};
+      for (int axis = 0; axis < 3; ++axis) {
+        own[held + axis].add(1 - free[axis]);
+        own[elastic].add(block_[i](axis, axis));
+      }
+      own[count].add(1);
+      if (!weight_.empty()) own[inertia].add(3 * weight_[i]);
+      for (int e = 0; e < 9 && !more.empty(); ++e) {
+        own[stiffness + e].add(more[i](e / 3, e % 3));
+      }
+    }
+  }
+  add_over_ranks(model_, sums);
+  wholes_.resize(lattices_.size());
+  any_loose_ = false;
+  for (std::size_t b = 0; b < wholes_.size(); ++b) {
+    const auto value = [&](int term) {
+      return sums[terms * b + static_cast<std::size_t>(term)].value();
+    };
+    Whole& whole = wholes_[b];
+    const auto is_loose = [&](int axis) { return value(held + axis) == 0 ? 1.0 : 0.0; };
+    whole.loose = {is_loose(0), is_loose(1), is_loose(2)};
+    whole.shares = weight_.empty() ? value(count) : value(inertia) / 3;
+    constexpr double share = 0.1;
+    whole.is_light = value(inertia) < share * value(elastic);
+    any_loose_ = any_loose_ || whole.loose != Vec3d{};
+    Mat3d all;
+    for (int e = 0; e < 9; ++e) all(e / 3, e % 3) = value(stiffness + e);
+    whole.yielding = pseudo_inverse_on(whole.loose, all, weight_.empty() ? 1e-4 : 0);
+  }
+}
+
+/// Takes motions of whole bodies along loose axes out of z, and adds those by the total forces on
+/// them.
+void Preconditioner::project(Vector& z, const std::vector<Vec3d>& totals) const {
+  const double largest = largest_component(vectors_, z);
+  double most = 1;
+  for (const Whole& whole : wholes_) most = std::max(most, whole.shares);
+  const double by = largest > 0 ? std::ldexp(1, 61) / (largest * most) : 1;
+  std::vector<std::int64_t> sums(3 * wholes_.size());
+  for (const Part& part : model_.parts) {
+    std::int64_t* const own = &sums[3 * static_cast<std::size_t>(part.body)];
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      const double scale = by * share_of(i);
+      own[0] += std::llrint(scale * z[i].x);
+      own[1] += std::llrint(scale * z[i].y);
+      own[2] += std::llrint(scale * z[i].z);
+    }
+  }
+  if (model_.share) model_.share->communicator->add(sums);
+  for (const Part& part : model_.parts) {
+    const auto b = static_cast<std::size_t>(part.body);
+    const Whole& whole = wholes_[b];
+    const auto mean = [&](std::size_t axis) {
+      return static_cast<double>(sums[3 * b + axis]) / (by * whole.shares);
+    };
+    const Vec3d change =
+        whole.yielding * totals[b] - by_components(whole.loose, Vec3d{mean(0), mean(1), mean(2)});
+    for (Index i = part.begin; i < part.owned_end(); ++i) z[i] += change;
+  }
+}
+
+/// The sums of r at the nodes of each body, of all ranks. @param largest component of r
+/// @param by receives what values were multiplied by
+std::vector<std::span<std::int64_t>> Preconditioner::gathered(const Vector& r, double largest,
+                                                              double& by) {
   double most = 1;
   for (const BodyLattices& one : lattices_) most = std::max(most, one.most());
-  const double by = BodyLattices::largest_sum / (largest * most);
+  by = largest > 0 ? BodyLattices::largest_sum / (largest * most) : 1;
+  std::vector<std::span<std::int64_t>> sums;
   std::size_t at = 0;
   for (BodyLattices& one : lattices_) {
-    one.gather(free_, r, by, std::span(sums_).subspan(at, one.size()));
+    sums.push_back(std::span(sums_).subspan(at, one.size()));
+    one.gather(free_, r, by, sums.back());
     at += one.size();
   }
   if (model_.share) model_.share->communicator->add(sums_);
-  at = 0;
-  for (BodyLattices& one : lattices_) {
-    one.correct(std::span(sums_).subspan(at, one.size()), by, free_, z);
-    at += one.size();
+  return sums;
+}
+
+void Preconditioner::apply(const Vector& r, Vector& z) {
+  double by = 1;
+  const std::vector<std::span<std::int64_t>> sums = gathered(r, largest_component(vectors_, r), by);
+  std::vector<Vec3d> totals, means;
+  for (std::size_t b = 0; b < lattices_.size(); ++b) {
+    totals.push_back(by_components(wholes_[b].loose, lattices_[b].total(sums[b], by)));
+    means.push_back((1 / wholes_[b].shares) * totals.back());
   }
+  for (const Part& part : model_.parts) {
+    const Vec3d mean = means[static_cast<std::size_t>(part.body)];
+#pragma omp parallel for schedule(static)
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      z[i] = inverse_[i] * (r[i] - share_of(i) * mean);
+    }
+  }
+  for (std::size_t b = 0; b < lattices_.size(); ++b) {
+    if (wholes_[b].is_light) lattices_[b].correct(sums[b], by, means[b], free_, z);
+  }
+  if (any_loose_) project(z, totals);
 }
 
 }  // namespace phyxel

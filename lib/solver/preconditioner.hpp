@@ -15,11 +15,14 @@ namespace phyxel {
 /// An approximate inverse of the stiffness of a model: that of each phyxel alone, for what is
 /// rough, and lattices behind each body, for what is smooth,
 ///
-///   z = B⁻¹ r + Σ P (V-cycle) Pᵀ r,
+///   z = Q (B⁻¹ + P V Pᵀ) Q r + E T⁺ Eᵀ r,
 ///
-/// where P takes the displacements of nodes to phyxels. Conjugate gradients then need about as many
-/// iterations for many phyxels as for few. The first part is that of small strains at rest, with
-/// inertia and contact; the second one turns with the body.
+/// where P takes the displacements of nodes to phyxels, and V is a V-cycle. E moves whole bodies
+/// along axes along which nothing holds them; Q = 1 - E (EᵀDE)⁻¹ EᵀD leaves such motions out, with
+/// D the inertia of phyxels, or 1 without; and T is the stiffness against them, by inertia and
+/// contact. Where inertia is no less than a tenth of the stiffness of phyxels, B is enough.
+/// Conjugate gradients then need about as many iterations for many phyxels as for few. The first
+/// part is that of small strains at rest, with inertia and contact; lattices turn with the body.
 class Preconditioner {
  public:
   using Vector = OwnedVectors::Vector;
@@ -41,6 +44,18 @@ class Preconditioner {
   void apply(const Vector& r, Vector& z);
 
  private:
+  /// A body as a whole.
+  struct Whole {
+    Vec3d loose;           ///< 1 along axes along which nothing holds it, 0 along others.
+    double shares = 1;     ///< EᵀDE, of each axis.
+    Mat3d yielding;        ///< T⁺ [m/N].
+    bool is_light = true;  ///< True if lattices help.
+  };
+  void find_wholes(std::span<const Mat3d> more);
+  void project(Vector& z, const std::vector<Vec3d>& totals) const;
+  double share_of(Index i) const { return weight_.empty() ? 1 : weight_[i]; }
+  std::vector<std::span<std::int64_t>> gathered(const Vector& r, double largest, double& by);
+
   const Model& model_;
   const OwnedVectors& vectors_;
   Vector free_;
@@ -49,6 +64,8 @@ class Preconditioner {
   std::vector<Mat3d> gradient_;         // of displacement; empty: at rest
   std::vector<Mat3d> block_, inverse_;  // of each phyxel
   std::vector<BodyLattices> lattices_;  // of each body
+  std::vector<Whole> wholes_;           // of each body
+  bool any_loose_ = false;
   std::vector<std::int64_t> sums_;
 };
 

@@ -45,7 +45,7 @@ void add_outer(const Giver& giver, Vec3d g, Mat3d& block) {
 double estimate(const Model& model, const Part& part, Index i) {
   constexpr double of_lattices = 1.6;  // of `stiffness_blocks`: 1 in the bulk, 2.4 at faces
   const double h = model.neighbourhood.support[i];
-  if (!(h > 0)) return 1;
+  if (!(h > 0)) return 0;  // nothing is near it
   return of_lattices * wave_stiffness_at_rest(part.material) * model.volume[i] / (h * h);
 }
 

@@ -388,11 +388,11 @@ inline constexpr double recovery_in_step = 0.2;
 
 /// The recovery of a point of a surface: a fifth of the depth in a step, up to a hundredth of the
 /// range. Steps far below the stable one recover as much by time as a stable one, since a fifth of
-/// the depth in a very short step would fling the point out. A longer stable time than that below
-/// leaves bodies at rest deeper in each other.
+/// the depth in a very short step would fling the point out. A shorter stable time than that below
+/// makes energy where folds press on each other; a longer one leaves bodies at rest deeper.
 PHYXEL_HD DepthRecovery depth_recovery(const SurfaceSite& site, double dt) {
   constexpr double most = 0.01;   // of the range in a step
-  constexpr double stable = 0.2;  // stable steps are at least as many times range / wave speed
+  constexpr double stable = 0.5;  // stable steps are at most as many times range / wave speed
   const double in_stable = site.wave_speed / (stable * site.range);  // [1/s]
   const double rate = in_stable < 1 / dt ? in_stable : 1 / dt;
   return {recovery_in_step * rate, most * site.range * rate};
