@@ -59,20 +59,18 @@ double largest_component(const OwnedVectors& vectors, const std::vector<Vec3d>& 
   });
 }
 
-/// The pseudo-inverse on some axes. @param least share of the largest eigenvalue below which others
-/// count as 0
-Mat3d pseudo_inverse_on(Vec3d axes, const Mat3d& matrix, double least) {
+/// The pseudo-inverse on some axes.
+Mat3d pseudo_inverse_on(Vec3d axes, const Mat3d& matrix) {
   const double of_axis[] = {axes.x, axes.y, axes.z};
   Eigen::Matrix3d all;
   for (int e = 0; e < 9; ++e) {
     all(e / 3, e % 3) = of_axis[e / 3] * of_axis[e % 3] * matrix(e / 3, e % 3);
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(all);
-  const double largest = solver.eigenvalues().maxCoeff();
   Mat3d found;
   for (int k = 0; k < 3; ++k) {
     const double value = solver.eigenvalues()[k];
-    if (!(value > least * largest) || !(value > 0)) continue;
+    if (!(value > 0)) continue;
     const Eigen::Vector3d way = solver.eigenvectors().col(k);
     for (int e = 0; e < 9; ++e) found(e / 3, e % 3) += way[e / 3] * way[e % 3] / value;
   }
@@ -168,7 +166,13 @@ void Preconditioner::find_wholes(std::span<const Mat3d> more) {
       return sums[terms * b + static_cast<std::size_t>(term)].value();
     };
     Whole& whole = wholes_[b];
-    const auto is_loose = [&](int axis) { return value(held + axis) == 0 ? 1.0 : 0.0; };
+    // At rest, friction and contact along slanted surfaces hold a body by what lattices know.
+    const auto along = [&](int axis) { return value(stiffness + 4 * axis); };
+    constexpr double next_to_nothing = 1e-12;
+    const double most = next_to_nothing * std::max({along(0), along(1), along(2)});
+    const auto is_loose = [&](int axis) {
+      return value(held + axis) == 0 && (!weight_.empty() || along(axis) <= most) ? 1.0 : 0.0;
+    };
     whole.loose = {is_loose(0), is_loose(1), is_loose(2)};
     whole.shares = weight_.empty() ? value(count) : value(inertia) / 3;
     constexpr double share = 0.1;
@@ -176,7 +180,7 @@ void Preconditioner::find_wholes(std::span<const Mat3d> more) {
     any_loose_ = any_loose_ || whole.loose != Vec3d{};
     Mat3d all;
     for (int e = 0; e < 9; ++e) all(e / 3, e % 3) = value(stiffness + e);
-    whole.yielding = pseudo_inverse_on(whole.loose, all, weight_.empty() ? 1e-4 : 0);
+    whole.yielding = weight_.empty() ? Mat3d{} : pseudo_inverse_on(whole.loose, all);
   }
 }
 
