@@ -15,7 +15,7 @@ namespace phyxel {
 /// An approximate inverse of the stiffness of a model: that of each phyxel alone, for what is
 /// rough, and lattices behind each body, for what is smooth,
 ///
-///   z = Q (B⁻¹ + P V Pᵀ) Q r + E T⁺ Eᵀ r,
+///   z = Q (B⁻¹ + P V Pᵀ) Qᵀ r + E T⁺ Eᵀ r,
 ///
 /// where P takes the displacements of nodes to phyxels, and V is a V-cycle. E moves whole bodies
 /// along axes along which nothing holds them; Q = 1 - E (EᵀDE)⁻¹ EᵀD leaves such motions out, with
