@@ -6,12 +6,11 @@
 #include <utility>
 
 #include "rank_exchange.hpp"
-#include "solver/node_lists.hpp"
+#include "solver/lists_from_pairs.hpp"
 
 namespace phyxel {
 namespace {
 
-constexpr Index worth_threads = 2000;  // nodes
 constexpr Index most_coarsest = 100;   // nodes
 constexpr double whole_hat = 1 << 16;  // quanta of a hat of 1
 
@@ -42,9 +41,6 @@ std::vector<std::uint64_t> of_all_ranks(const Communicator* ranks,
   make_unique();
   return keys;
 }
-
-/// The product of components.
-Vec3d by_axis(Vec3d a, Vec3d b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
 }  // namespace
 
@@ -296,7 +292,7 @@ void BodyLattices::correct(std::span<const std::int64_t> sums, double by, Vec3d 
   Nodes& right = right_.front();
   right = at_nodes(sums, by);
   if (mean != Vec3d{}) {
-    for (std::size_t a = 0; a < right.size(); ++a) right[a] -= by_axis(shares_[a], mean);
+    for (std::size_t a = 0; a < right.size(); ++a) right[a] -= by_components(shares_[a], mean);
   }
   levels_.front().restrict_to_free(right);
   cycle(0);
@@ -309,7 +305,7 @@ void BodyLattices::correct(std::span<const std::int64_t> sums, double by, Vec3d 
       sum += static_cast<double>(hat_[8 * p + k]) * left[node_[8 * p + k]];
     }
     const Index i = sources_[p].phyxel;
-    x[i] += Vec3d{free[i].x * sum.x, free[i].y * sum.y, free[i].z * sum.z};
+    x[i] += by_components(free[i], sum);
   }
 }
 

@@ -1,4 +1,4 @@
-/// The stiffness of a body on nested lattices, which smooth forces are solved for.
+/// The stiffness of a body on nested lattices, for smooth displacements.
 #pragma once
 
 #include <array>
@@ -93,6 +93,7 @@ class BodyLattices {
   void find_cells();
   /// Adds up the stiffness of the cells of a layer of the lattice, times `by`.
   std::vector<double> stiffness_of_cells(int layer, const Present& present, double by) const;
+  void add_cell(Index node, Index cell, const double* matrix, std::int64_t* blocks) const;
   void coarsen(std::size_t level);
   void factor();
   void solve_coarsest();

@@ -64,7 +64,7 @@ struct ContactPasses {
     return [this](Offset e) -> const SurfaceMotion& { return motion[near[e]]; };
   }
 
-  /// Of a row of a point beside several patches: tells which entries are of its own.
+  /// Marks the entries of a row that are in its patch, if its point is beside several patches.
   template <class Threads>
   PHYXEL_HD void find_patch(const Threads& threads, Index r) const {
     const ContactRow& here = row[r];

@@ -1,6 +1,5 @@
 #include "solver/contact_penalty.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 
 #include "model/contact.hpp"

@@ -6,6 +6,7 @@
 
 #include "model/spatial_hash.hpp"
 #include "rank_exchange.hpp"
+#include "solver/lists_from_pairs.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {
@@ -91,12 +92,7 @@ bool ContactRows::have_patches() const {
 
 Csr grouped(std::size_t lists, std::span<const std::pair<Index, Index>> entries) {
   Csr csr;
-  csr.offsets.assign(lists + 1, 0);
-  for (const auto& [list, value] : entries) ++csr.offsets[static_cast<std::size_t>(list) + 1];
-  for (std::size_t k = 0; k < lists; ++k) csr.offsets[k + 1] += csr.offsets[k];
-  csr.indices.resize(entries.size());
-  std::vector<Offset> next(csr.offsets.begin(), csr.offsets.end() - 1);
-  for (const auto& [list, value] : entries) csr.indices[next[list]++] = value;
+  group(lists, entries, csr.offsets, csr.indices);
   return csr;
 }
 

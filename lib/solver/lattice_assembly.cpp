@@ -4,20 +4,13 @@
 #include <utility>
 
 #include "solver/body_lattices.hpp"
-#include "solver/node_lists.hpp"
+#include "solver/lists_from_pairs.hpp"
+#include "solver/on_axes.hpp"
 
 namespace phyxel {
 namespace {
 
 constexpr std::size_t numbers = LatticeLevel::around * 9;
-
-/// A block without the rows and columns of axes along which nodes do not move.
-Mat3d masked(const Mat3d& block, Vec3d rows, Vec3d columns) {
-  const double r[] = {rows.x, rows.y, rows.z}, c[] = {columns.x, columns.y, columns.z};
-  Mat3d found;
-  for (int e = 0; e < 9; ++e) found(e / 3, e % 3) = r[e / 3] * c[e % 3] * block(e / 3, e % 3);
-  return found;
-}
 
 }  // namespace
 
@@ -146,6 +139,25 @@ double BodyLattices::largest_entry(const Present& present) const {
   return ranks_ ? ranks_->largest(largest) : largest;
 }
 
+/// Adds the stiffness of a cell to the blocks of one of its nodes.
+/// @param cell its number times 8, plus the place of the node in it
+void BodyLattices::add_cell(Index node, Index cell, const double* matrix,
+                            std::int64_t* blocks) const {
+  const LatticeLevel& finest = levels_.front();
+  const Vec3<int> at = finest.node(node);
+  const auto corner = static_cast<std::size_t>(cell % 8);
+  for (std::size_t b = 0; b < 8; ++b) {
+    const Vec3<int> other = finest.node(cell_node_[cell / 8][b]);
+    const int place = LatticeLevel::place_around({other.x - at.x, other.y - at.y, other.z - at.z});
+    for (std::size_t e = 0; e < 9; ++e) {
+      const std::size_t r = e / 3, c = e % 3;
+      const double value = corner <= b ? matrix[(3 * corner + r) * unknowns + 3 * b + c]
+                                       : matrix[(3 * b + c) * unknowns + 3 * corner + r];
+      blocks[static_cast<std::size_t>(place) * 9 + e] += static_cast<std::int64_t>(value);
+    }
+  }
+}
+
 // Layer by layer, so that the stiffness of few cells is kept at a time.
 void BodyLattices::assemble(std::span<const Vec3d> free, const Present& present) {
   LatticeLevel& finest = levels_.front();
@@ -163,27 +175,11 @@ void BodyLattices::assemble(std::span<const Vec3d> free, const Present& present)
 #pragma omp parallel for schedule(dynamic, 16)
     for (Index a = begin; a < node; ++a) {
       std::int64_t* own = sums.data() + static_cast<std::size_t>(a - begin) * numbers;
-      const Vec3<int> at = finest.node(a);
       for (Offset n = cell_start_[a]; n < cell_start_[a + 1]; ++n) {
-        const Index cell = cell_[n] / 8;
-        const auto corner = static_cast<std::size_t>(cell_[n] % 8);
-        const Offset first = layer_start_[static_cast<std::size_t>(layer)];
-        const double* matrix =
-            cell >= first ? &here[static_cast<std::size_t>(cell - first) * unknowns * unknowns]
-                          : &before[static_cast<std::size_t>(
-                                        cell - layer_start_[static_cast<std::size_t>(layer) - 1]) *
-                                    unknowns * unknowns];
-        for (std::size_t b = 0; b < 8; ++b) {
-          const Vec3<int> other = finest.node(cell_node_[cell][b]);
-          const int place =
-              LatticeLevel::place_around({other.x - at.x, other.y - at.y, other.z - at.z});
-          for (std::size_t e = 0; e < 9; ++e) {
-            const std::size_t r = e / 3, c = e % 3;
-            const double value = corner <= b ? matrix[(3 * corner + r) * unknowns + 3 * b + c]
-                                             : matrix[(3 * b + c) * unknowns + 3 * corner + r];
-            own[static_cast<std::size_t>(place) * 9 + e] += static_cast<std::int64_t>(value);
-          }
-        }
+        const bool is_here = cell_[n] / 8 >= layer_start_[static_cast<std::size_t>(layer)];
+        const auto first = static_cast<std::size_t>(is_here ? layer : layer - 1);
+        const auto number = static_cast<std::size_t>(cell_[n] / 8 - layer_start_[first]);
+        add_cell(a, cell_[n], &(is_here ? here : before)[number * unknowns * unknowns], own);
       }
     }
     add_over_ranks(sums);
@@ -195,7 +191,7 @@ void BodyLattices::assemble(std::span<const Vec3d> free, const Present& present)
         if (b < 0) continue;
         Mat3d block;
         for (int e = 0; e < 9; ++e) block(e / 3, e % 3) = static_cast<double>(own[e]) / by;
-        finest.set_block(a, k, masked(block, free_axes[a], free_axes[b]));
+        finest.set_block(a, k, on_axes(block, free_axes[a], free_axes[b]));
       }
     }
   }

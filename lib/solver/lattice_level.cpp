@@ -1,37 +1,23 @@
 #include "solver/lattice_level.hpp"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+
+#include "solver/on_axes.hpp"
 
 namespace phyxel {
 namespace {
 
-constexpr Index worth_threads = 2000;  // nodes
-constexpr std::size_t numbers =
-    12;  // of a block: three columns of four, the last one of which is 0
+/// Numbers of a block: three columns of four, the last number of each of which is 0.
+constexpr std::size_t numbers = 12;
 using Floats = float __attribute__((vector_size(16), aligned(4)));
 using Doubles = double __attribute__((vector_size(32)));
 
-/// The inverse of a block on the axes along which it has a stiffness, 0 on others.
-Mat3d inverse_of(const Mat3d& block) {
-  Eigen::Matrix3d all;
-  double most = 0;
-  for (int r = 0; r < 3; ++r) most = std::max(most, block(r, r));
-  bool has[3];
-  for (int r = 0; r < 3; ++r) has[r] = block(r, r) > 1e-12 * most;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) {
-      const bool counts = has[r] && has[c];
-      all(r, c) = counts ? block(r, c) : r == c ? std::max(most, 1e-300) : 0;
-    }
-  }
-  const Eigen::Matrix3d inverse = all.inverse();
-  Mat3d found;
-  for (int r = 0; r < 3; ++r) {
-    for (int c = 0; c < 3; ++c) found(r, c) = has[r] && has[c] ? inverse(r, c) : 0;
-  }
-  return found;
+/// 1 along the axes along which a block has a stiffness, 0 along others.
+Vec3d stiff_axes(const Mat3d& block) {
+  const double most = std::max({block(0, 0), block(1, 1), block(2, 2)});
+  const auto is_stiff = [&](int axis) { return block(axis, axis) > 1e-12 * most ? 1.0 : 0.0; };
+  return {is_stiff(0), is_stiff(1), is_stiff(2)};
 }
 
 }  // namespace
@@ -99,7 +85,10 @@ Mat3d LatticeLevel::block(Index a, int k) const {
 void LatticeLevel::begin() {
   inverse_.resize(keys_.size());
 #pragma omp parallel for schedule(static) if (size() > worth_threads)
-  for (Index a = 0; a < size(); ++a) inverse_[a] = inverse_of(block(a, around / 2));
+  for (Index a = 0; a < size(); ++a) {
+    const Mat3d own = block(a, around / 2);
+    inverse_[a] = inverse_on_axes(own, stiff_axes(own));
+  }
   largest_ = largest_eigenvalue();
 }
 

@@ -9,6 +9,9 @@
 
 namespace phyxel {
 
+/// The number of nodes from which on several threads share a loop.
+inline constexpr Index worth_threads = 2000;
+
 /// A regular lattice of nodes.
 struct Lattice {
   Vec3d low;           ///< Its lowest node [m].

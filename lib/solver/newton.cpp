@@ -403,9 +403,9 @@ void Newton::begin_preconditioner(const Balance& balance, const Vector& u) {
   preconditioner_.set(balance.free, balance.weight, contact_.held_blocks(), std::move(gradient));
 }
 
-/// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by conjugate
-/// gradients preconditioned with `stiffness_` and that of contact. They stop at the first direction
-/// of negative stiffness. @param force,all forces at u without and with contact [N]
+/// Finds the step of Newton's method, in which prescribed phyxels reach their targets, by
+/// preconditioned conjugate gradients. They stop at the first direction of negative stiffness.
+/// @param force,all forces at u without and with contact [N]
 Newton::Inner Newton::find_step(const Balance& balance, const Vector& u, const Vector& force,
                                 const Vector& all, Vector& step) {
   Vector rest = vectors_.make(), image = vectors_.make();

@@ -8,7 +8,7 @@
 #include "model/parts.hpp"
 #include "rank_exchange.hpp"
 #include "rank_sums.hpp"
-#include "solver/boundary_conditions.hpp"
+#include "solver/on_axes.hpp"
 #include "solver/step_sums.hpp"
 #include "solver/stiffness_blocks.hpp"
 
@@ -37,22 +37,6 @@ std::vector<Box> boxes_of_bodies(const Model& model) {
   return boxes;
 }
 
-/// The inverse on free axes, 0 on others.
-Mat3d inverse_on(Vec3d free, const Mat3d& block) {
-  const double of_axis[] = {free.x, free.y, free.z};
-  Eigen::Matrix3d all = Eigen::Matrix3d::Identity();
-  if (!(block(0, 0) + block(1, 1) + block(2, 2) > 0)) return {};  // nothing resists
-  for (int e = 0; e < 9; ++e) {
-    if (of_axis[e / 3] * of_axis[e % 3] > 0) all(e / 3, e % 3) = block(e / 3, e % 3);
-  }
-  const Eigen::Matrix3d inverse = all.inverse();
-  Mat3d found;
-  for (int e = 0; e < 9; ++e) {
-    found(e / 3, e % 3) = of_axis[e / 3] * of_axis[e % 3] * inverse(e / 3, e % 3);
-  }
-  return found;
-}
-
 double largest_component(const OwnedVectors& vectors, const std::vector<Vec3d>& v) {
   return vectors.largest([&](Index i) {
     return std::max({std::abs(v[i].x), std::abs(v[i].y), std::abs(v[i].z)});
@@ -61,11 +45,9 @@ double largest_component(const OwnedVectors& vectors, const std::vector<Vec3d>& 
 
 /// The pseudo-inverse on some axes.
 Mat3d pseudo_inverse_on(Vec3d axes, const Mat3d& matrix) {
-  const double of_axis[] = {axes.x, axes.y, axes.z};
+  const Mat3d own = on_axes(matrix, axes, axes);
   Eigen::Matrix3d all;
-  for (int e = 0; e < 9; ++e) {
-    all(e / 3, e % 3) = of_axis[e / 3] * of_axis[e % 3] * matrix(e / 3, e % 3);
-  }
+  for (int e = 0; e < 9; ++e) all(e / 3, e % 3) = own(e / 3, e % 3);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(all);
   Mat3d found;
   for (int k = 0; k < 3; ++k) {
@@ -124,7 +106,7 @@ void Preconditioner::set(const Vector& free, std::span<const double> weight, con
   for (const auto& [i, block] : contact) more[i] += block;
   inverse_.resize(block_.size());
   vectors_.for_each([&](Index i) {
-    inverse_[i] = inverse_on(free[i], more.empty() ? block_[i] : block_[i] + more[i]);
+    inverse_[i] = inverse_on_axes(more.empty() ? block_[i] : block_[i] + more[i], free[i]);
   });
   find_wholes(more);
   if (any_loose_) {
@@ -135,11 +117,12 @@ void Preconditioner::set(const Vector& free, std::span<const double> weight, con
     for (std::size_t b = 0; b < lattices_.size(); ++b) lattices_[b].set_shares(sums[b], by);
   }
   for (std::size_t b = 0; b < lattices_.size(); ++b) {
-    if (wholes_[b].is_light) lattices_[b].set(free, {gradient_, more});
+    if (wholes_[b].uses_lattices) lattices_[b].set(free, {gradient_, more});
   }
 }
 
-/// Finds what holds each body, and its inertia. @param more stiffness by inertia and contact
+/// Finds the axes along which supports hold each body, and its inertia. @param more stiffness by
+/// inertia and contact
 void Preconditioner::find_wholes(std::span<const Mat3d> more) {
   enum Term { held, stiffness = 3, inertia = 12, elastic, count, terms };
   StepSums sums(terms * lattices_.size());
@@ -166,7 +149,7 @@ void Preconditioner::find_wholes(std::span<const Mat3d> more) {
       return sums[terms * b + static_cast<std::size_t>(term)].value();
     };
     Whole& whole = wholes_[b];
-    // At rest, friction and contact along slanted surfaces hold a body by what lattices know.
+    // At rest, lattices know of friction, and of contact with slanted surfaces.
     const auto along = [&](int axis) { return value(stiffness + 4 * axis); };
     constexpr double next_to_nothing = 1e-12;
     const double most = next_to_nothing * std::max({along(0), along(1), along(2)});
@@ -176,16 +159,16 @@ void Preconditioner::find_wholes(std::span<const Mat3d> more) {
     whole.loose = {is_loose(0), is_loose(1), is_loose(2)};
     whole.shares = weight_.empty() ? value(count) : value(inertia) / 3;
     constexpr double share = 0.1;
-    whole.is_light = value(inertia) < share * value(elastic);
+    whole.uses_lattices = value(inertia) < share * value(elastic);
     any_loose_ = any_loose_ || whole.loose != Vec3d{};
     Mat3d all;
     for (int e = 0; e < 9; ++e) all(e / 3, e % 3) = value(stiffness + e);
-    whole.yielding = weight_.empty() ? Mat3d{} : pseudo_inverse_on(whole.loose, all);
+    whole.compliance = weight_.empty() ? Mat3d{} : pseudo_inverse_on(whole.loose, all);
   }
 }
 
-/// Takes motions of whole bodies along loose axes out of z, and adds those by the total forces on
-/// them.
+/// Takes motions of whole bodies along loose axes out of z, and adds the motions that the total
+/// forces cause.
 void Preconditioner::project(Vector& z, const std::vector<Vec3d>& totals) const {
   const double largest = largest_component(vectors_, z);
   double most = 1;
@@ -209,13 +192,13 @@ void Preconditioner::project(Vector& z, const std::vector<Vec3d>& totals) const 
       return static_cast<double>(sums[3 * b + axis]) / (by * whole.shares);
     };
     const Vec3d change =
-        whole.yielding * totals[b] - by_components(whole.loose, Vec3d{mean(0), mean(1), mean(2)});
+        whole.compliance * totals[b] - by_components(whole.loose, Vec3d{mean(0), mean(1), mean(2)});
     for (Index i = part.begin; i < part.owned_end(); ++i) z[i] += change;
   }
 }
 
 /// The sums of r at the nodes of each body, of all ranks. @param largest component of r
-/// @param by receives what values were multiplied by
+/// @param by receives the factor of the values (`BodyLattices::gather`)
 std::vector<std::span<std::int64_t>> Preconditioner::gathered(const Vector& r, double largest,
                                                               double& by) {
   double most = 1;
@@ -248,7 +231,7 @@ void Preconditioner::apply(const Vector& r, Vector& z) {
     }
   }
   for (std::size_t b = 0; b < lattices_.size(); ++b) {
-    if (wholes_[b].is_light) lattices_[b].correct(sums[b], by, means[b], free_, z);
+    if (wholes_[b].uses_lattices) lattices_[b].correct(sums[b], by, means[b], free_, z);
   }
   if (any_loose_) project(z, totals);
 }

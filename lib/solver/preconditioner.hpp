@@ -12,8 +12,8 @@
 
 namespace phyxel {
 
-/// An approximate inverse of the stiffness of a model: that of each phyxel alone, for what is
-/// rough, and lattices behind each body, for what is smooth,
+/// An approximate inverse of the stiffness of a model. It consists of the stiffness of single
+/// phyxels, for rough displacements, and of lattices behind each body, for smooth ones,
 ///
 ///   z = Q (B⁻¹ + P V Pᵀ) Qᵀ r + E T⁺ Eᵀ r,
 ///
@@ -32,7 +32,7 @@ class Preconditioner {
   /// Collective on a share. All arguments must outlive this.
   Preconditioner(const Model& model, const OwnedVectors& vectors);
 
-  /// Sets what adds to elasticity. Collective on a share.
+  /// Sets the terms beside elasticity. Collective on a share.
   /// @param free 1 along free axes, 0 along others, shape [n]
   /// @param weight inertia of phyxels [kg/s²], shape [n] or empty
   /// @param contact blocks of phyxels in contact
@@ -44,12 +44,12 @@ class Preconditioner {
   void apply(const Vector& r, Vector& z);
 
  private:
-  /// A body as a whole.
+  /// The motion of a body as a whole.
   struct Whole {
-    Vec3d loose;           ///< 1 along axes along which nothing holds it, 0 along others.
-    double shares = 1;     ///< EᵀDE, of each axis.
-    Mat3d yielding;        ///< T⁺ [m/N].
-    bool is_light = true;  ///< True if lattices help.
+    Vec3d loose;                ///< 1 along axes along which nothing holds it, 0 along others.
+    double shares = 1;          ///< EᵀDE, of each axis.
+    Mat3d compliance;           ///< T⁺ [m/N].
+    bool uses_lattices = true;  ///< False if inertia outweighs stiffness.
   };
   void find_wholes(std::span<const Mat3d> more);
   void project(Vector& z, const std::vector<Vec3d>& totals) const;
