@@ -8,6 +8,7 @@
 #include "model/assembly.hpp"
 #include "phyxel/physics/surface_patches.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/contact_passes.hpp"
 #include "support/contact_scene.hpp"
 
 namespace phyxel {
@@ -153,6 +154,33 @@ TEST_F(Patches, DoNotDependOnPhyxelsBeyondTheRangeOrOnOtherSides) {
   EXPECT_EQ(after[0], 0);
   EXPECT_EQ(after[1], 1);
   EXPECT_EQ(after.back(), 2);
+}
+
+TEST_F(Patches, ShareTheEntriesOfAPointAmongItsRows) {
+  add(0, 0);  // the point
+  motions_.back().out = {0, 0, 1};
+  add(0, 0.5);
+  add(0.6, 0.4);
+  add(9, -0.2);
+  const std::vector<Index> near{1, 2, 3, 1, 2, 3, 1, 2, 3};
+  std::vector<ContactRow> rows;
+  std::vector<Offset> start{0};
+  for (Index patch = 0; patch < most_patches; ++patch) {
+    rows.push_back({.patch = patch, .patches = most_patches});
+    for (int thread = 0; thread < contact_threads; ++thread) start.push_back(3 * (patch + 1));
+  }
+  std::vector<SurfaceShare> carries(near.size(), {.weight = 1, .part = 1, .area = 1});
+  std::vector<char> in_patch(near.size(), 1);
+  const ContactPasses passes{.site = sites_.data(),
+                             .motion = motions_.data(),
+                             .row = rows.data(),
+                             .near_start = start.data(),
+                             .near = near.data(),
+                             .carries = carries.data(),
+                             .in_patch = in_patch.data()};
+  for (Index r = 0; r < most_patches; ++r) passes.find_patch(OneThread{}, r);
+  EXPECT_EQ(in_patch, (std::vector<char>{0, 0, 1, 1, 1, 0, 0, 0, 0}));
+  for (const SurfaceShare& share : carries) EXPECT_EQ(share.part, 0);
 }
 
 TEST_F(Patches, MayBeSeveralIfPhyxelsAreFarFromOthers) {
