@@ -137,7 +137,7 @@ void set_lists(const Candidates& points, const Numbers& number, FoundRows found,
   lists.rows = std::move(found.rows);
   lists.have_patches = found.have_patches;
   lists.near = std::move(found.near);
-  lists.row_of_entry = std::move(found.row_of_entry);
+  lists.rows_naming = gathered(found.row_of_entry, lists.entries_of);
 }
 
 /// Sets the tiles of places, and where these are in them.
@@ -216,14 +216,14 @@ void DeviceTouchingPoints::send_reach() {
   partner_law_ = sent(laws, name);
 }
 
-void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt) {
+void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt, double skin) {
   const Phase phase("points that may touch");
   const PooledMemory pooled;
   if (dt != dt_) {
     gain_ = sent(layer_.gains(dt), name);
     dt_ = dt;
   }
-  reach_ = layer_.reach_of(boxes_of_groups(position));
+  reach_ = layer_.reach_of(boxes_of_groups(position), skin);
   send_reach();
   const Model& model = layer_.model();
   const int rank = model.share ? model.share->communicator->rank() : 0;
@@ -236,7 +236,7 @@ void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt) {
                         partner_start_.data(),
                         partner_.data(),
                         partner_law_.data(),
-                        layer_.skin(),
+                        skin,
                         rank};
   Candidates points = candidates_of(layer, position.size());
   if (model.share) points = sent(of_all_ranks(model, fetched(points)), name);
@@ -295,7 +295,7 @@ DeviceArray<double> DeviceTouchingPoints::wave_moduli() const {
 std::size_t DeviceTouchingPoints::bytes() const {
   const auto sum = [](const auto&... arrays) { return (arrays.bytes() + ...); };
   return sum(own_.layer, own_.place, own_.tiles, own_.entry, own_.body, own_.position, own_.centre,
-             lists_.site, lists_.id, lists_.rows, lists_.near, lists_.row_of_entry,
+             lists_.site, lists_.id, lists_.rows, lists_.near, lists_.rows_naming,
              lists_.entries_of, lists_.rows_from, lists_.near_start, lists_.entries_of_start,
              lists_.rows_from_start, site_, gain_, place_, id_, body_, rest_, centre_, group_begin_,
              group_end_, box_, partner_start_, partner_, partner_law_);

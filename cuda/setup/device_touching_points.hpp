@@ -33,7 +33,7 @@ class DeviceTouchingPoints {
     DeviceArray<Index> id;          ///< Shape [points].
     DeviceArray<ContactRow> rows;
     bool have_patches = false;  ///< True if a point of a row is beside several patches of a body.
-    DeviceArray<Index> near, row_of_entry, entries_of, rows_from;
+    DeviceArray<Index> near, rows_naming, entries_of, rows_from;
     DeviceArray<Offset> near_start, entries_of_start, rows_from_start;
   };
 
@@ -42,8 +42,8 @@ class DeviceTouchingPoints {
   DeviceTouchingPoints(const SurfaceLayer& layer, const std::vector<Index>& place, Index tiles);
 
   /// Finds the points anew from places [m], shape [layer]. Of a share: collective.
-  /// @param dt size of the step [s]
-  void find(const DeviceArray<Vec3d>& position, double dt);
+  /// @param dt size of the step [s]. @param skin by which lists reach beyond ranges [m]
+  void find(const DeviceArray<Vec3d>& position, double dt, double skin);
 
   const Own& own() const { return own_; }
   const Lists& lists() const { return lists_; }

@@ -85,10 +85,21 @@ __global__ void find_ways(Fields<Real, StateReal> f, const Index* place,
   ways[2 * numbers * blockIdx.x + threadIdx.x] = most;
 }
 
+/// Adds the way of points since the last call to that before.
+static __device__ void add_way(PointWay& way) {
+  way.before += way.in_step;
+  way.in_step = 0;
+}
+/// The same, by the first thread.
+static __global__ void end_way(PointWay* way) {
+  if (blockIdx.x == 0 && threadIdx.x == 0) add_way(*way);
+}
+
 /// Sets what is known of points at the start of a step. One thread per point.
 template <class Real, class StateReal>
-__global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
+__global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, PointWay* way) {
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p == 0) add_way(*way);
   if (p >= s.count) return;
   SurfaceMotion& motion = s.motion[p];
   motion.before = s.position[p] + displacement_at(f, s.place[p]);
@@ -99,13 +110,27 @@ __global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
   s.forces[p] = {};
 }
 
-/// Sets where points are at the end of a step, before contact. One thread per point.
+/// Sets where points are at the end of a step, before contact, and the largest of their ways there.
+/// One thread per point.
 template <class Real, class StateReal>
-__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s) {
+__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, PointWay* way) {
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (p >= s.count) return;
-  s.motion[p].after = s.position[p] + displacement_at(f, s.place[p]);
-  s.velocity[p] = to<double>(column3(f.velocity, f.places, s.place[p]));
+  double length = 0;
+  if (p < s.count) {
+    const Vec3<double> after = s.position[p] + displacement_at(f, s.place[p]);
+    const Vec3<double> gone = after - s.motion[p].after;
+    length = std::sqrt(dot(gone, gone));
+    s.motion[p].after = after;
+    s.velocity[p] = to<double>(column3(f.velocity, f.places, s.place[p]));
+  }
+  for (int lanes = 16; lanes > 0; lanes /= 2) {
+    length = fmax(length, __shfl_down_sync(0xffffffff, length, lanes));
+  }
+  // Positive doubles are in the order of their bits.
+  if (threadIdx.x % 32 == 0 && length > 0) {
+    atomicMax(reinterpret_cast<unsigned long long*>(&way->in_step),
+              static_cast<unsigned long long>(__double_as_longlong(length)));
+  }
 }
 
 // One group of threads per row or point.
@@ -138,6 +163,19 @@ static __global__ void find_row_rubs(PenaltyPasses passes, int rows) {
   if (threads.number() < rows) passes.find_rub(threads, threads.number());
 }
 
+/// Finds the depth of the deepest phyxel of each body in other bodies [m], of this device's points.
+/// One thread per row. @param body of each point. @param deepest zero at first
+static __global__ void find_depths(ContactPasses passes, const Index* body, int points, int rows,
+                                   double* deepest) {
+  const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (r >= rows || !passes.touch[r].is_inside || passes.row[r].point >= points) return;
+  const double depth = -passes.touch[r].gap;
+  if (!(depth > 0)) return;
+  // Positive doubles are in the order of their bits.
+  atomicMax(reinterpret_cast<unsigned long long*>(deepest + body[passes.row[r].point]),
+            static_cast<unsigned long long>(__double_as_longlong(depth)));
+}
+
 /// Changes the velocities of points by penalties as a step starts. One group of threads per point.
 /// @param regain 1 over what damping keeps of a velocity, shape [count]
 template <class Real, class StateReal>
@@ -145,7 +183,7 @@ __global__ void push_apart(Fields<Real, StateReal> f, ContactPasses passes, Surf
                            const double* regain) {
   const ThreadGroup threads;
   const int p = threads.number();
-  if (p >= s.count) return;
+  if (p >= s.count || !passes.is_active[p]) return;
   const Vec3<double> push = passes.forces_on(threads, p).normal;
   if (!threads.is_first()) return;
   s.forces[p].normal += push;
@@ -161,7 +199,7 @@ template <class Real, class StateReal>
 __global__ void rub_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
   const ThreadGroup threads;
   const int p = threads.number();
-  if (p >= s.count) return;
+  if (p >= s.count || !passes.is_active[p]) return;
   const Vec3<double> friction = passes.forces_on(threads, p).tangential;
   if (!threads.is_first()) return;
   s.forces[p].tangential += friction;
@@ -178,7 +216,7 @@ template <class Real, class StateReal>
 __global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
   const ThreadGroup threads;
   const int p = threads.number();
-  if (p >= s.count) return;
+  if (p >= s.count || !passes.is_active[p]) return;
   const PointForces forces = passes.forces_on(threads, p);
   if (!threads.is_first()) return;
   PointForces& all = s.forces[p];
@@ -203,8 +241,12 @@ __global__ void add_contact_terms(SurfacePlaces<Real> s, double dt, SumWords sum
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   ContactTerms terms;
   int first = 0;
+  PointForces all;
+  if (p < s.count) all = s.forces[p];
+  if (__all_sync(0xffffffff, all.normal == Vec3<double>{} && all.tangential == Vec3<double>{})) {
+    return;
+  }
   if (p < s.count) {
-    const PointForces all = s.forces[p];
     const SurfaceMotion& motion = s.motion[p];
     const Vec3<double> mean = 0.5 * (motion.earlier + s.velocity[p]);
     terms.set(dt * all.normal, dt * all.tangential, motion.before - s.centre[p], mean, mean);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "setup/device_touching_points.hpp"
@@ -16,6 +17,7 @@
 #include "solver/device_sums.cuh"
 #include "solver/passes.cuh"
 #include "solver/thread_group.cuh"
+#include "timeline.hpp"
 
 namespace phyxel::cuda {
 
@@ -73,13 +75,14 @@ class DeviceBodyContacts {
     sums_.prepare(own().place.size(), 1, [&] { m_.wait(); });
     passes.put_gradients({gradients_.data(), stride(), own().tiles.data()},
                          static_cast<Index>(own().tiles.size()));
-    m_.launch_each("begin_motion", begin_motion<Real, StateReal>, count(), m_.fields(), places());
+    m_.launch_each("begin_motion", begin_motion<Real, StateReal>, count(), m_.fields(), places(),
+                   way_.data());
   }
   /// Changes the velocities with which the step starts by penalties. Of a share: collective.
   void push_apart() {
     if (!pushes_ || !points_.any()) return;
     const PenaltyPasses passes = penalties();
-    m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
+    end_motion();
     if (m_.share()) refresh(motion_);
     find_touches(passes);
     launch_groups("find_row_pushes", find_row_pushes, rows(), passes, rows());
@@ -90,11 +93,48 @@ class DeviceBodyContacts {
   /// push. Of a share: collective.
   void keep_apart() {
     if (!acts() || !points_.any()) return;
-    m_.launch_each("end_motion", end_motion<Real, StateReal>, count(), m_.fields(), places());
+    if (pushes_) m_.launch_each("end_way", end_way, 1, way_.data());
+    end_motion();
     if (!pushes_) move_apart();
     if (rubs_) rub_apart();
     m_.launch_each("add_contact_terms", add_contact_terms<Real>, count(), places(), dt_,
                    sums_.pointer());
+  }
+  /// The depths, before `push_apart`, of the deepest phyxel of each body in other bodies [m].
+  /// Waits.
+  std::vector<double> depths() {
+    std::vector<double> deepest(m_.model().body_contact.distances.size());
+    if (!acts() || !points_.any()) return deepest;
+    DeviceArray<double> all(deepest.size(), name);
+    all.clear();
+    end_motion();
+    if (m_.share()) refresh(motion_);
+    find_touches(passes());
+    m_.launch_each("find_depths", find_depths, rows(), passes(), own().body.data(), count(), rows(),
+                   all.data());
+    m_.launch_each("end_way", end_way, 1, way_.data());
+    m_.wait();
+    return fetched(all);
+  }
+  /// The forces on phyxels of this device in the last step that its other forces do not contain
+  /// [N]: of a step that is tried. Waits.
+  std::vector<Vec3d> forces() const {
+    std::vector<Vec3d> forces;
+    if (!acts()) return forces;
+    forces.resize(static_cast<std::size_t>(m_.size()));
+    if (!points_.any()) return forces;
+    m_.wait();
+    const std::vector<PointForces> of_points = fetched(forces_);
+    const std::vector<Index> layer = fetched(own().layer);
+    for (std::size_t p = 0; p < layer.size(); ++p) {
+      // Penalties are among the other forces.
+      forces[layer_.phyxels()[layer[p]]] = pushes_ ? of_points[p].tangential : of_points[p].sum();
+    }
+    return forces;
+  }
+  /// Replaces the sums: takes steps back.
+  void set_sums(std::vector<ExactSum> sums) {
+    if (acts()) sums_.set(std::move(sums));
   }
   /// The sums of each body so far (`ContactTerms`). Waits for the steps in progress.
   std::vector<ExactSum> sums() const {
@@ -109,7 +149,8 @@ class DeviceBodyContacts {
                         ways_.bytes() + sums_.bytes() + points_.bytes() + motion_.bytes() +
                         velocity_.bytes() + response_.bytes() + carries_.bytes() +
                         in_patch_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
-                        forces_.bytes() + gradients_.bytes() + regain_.bytes() + modulus_.bytes();
+                        forces_.bytes() + gradients_.bytes() + regain_.bytes() + modulus_.bytes() +
+                        wakes_.bytes() + is_inside_.bytes() + is_active_.bytes() + way_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -129,7 +170,12 @@ class DeviceBodyContacts {
     return places;
   }
 
+  void end_motion() const {
+    m_.launch_each("end_motion", cuda::end_motion<Real, StateReal>, count(), m_.fields(), places(),
+                   way_.data());
+  }
   void find_touches(const ContactPasses& passes) const {
+    PHYXEL_CUDA(cudaMemsetAsync(is_active_.data(), 0, is_active_.bytes(), m_.stream()));
     if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, rows());
     launch_groups("find_touches", cuda::find_touches, rows(), passes, rows());
   }
@@ -166,12 +212,13 @@ class DeviceBodyContacts {
 
   /// Finds the points that may touch anew if phyxels have moved far enough.
   void look(double dt) {
+    const Phase phase("looking where bodies are");
     const int count = static_cast<int>(layer_place_.size());
-    if (!watch_.is_late_by(ways_now(), dt, layer_.skin())) return;
+    if (!watch_.is_late_by(ways_now(), dt)) return;
     m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
                    layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
     m_.wait();
-    points_.find(layer_found_, dt);
+    points_.find(layer_found_, dt, watch_.skin());
     watch_.found(points_.reach());
     make_arrays(dt);
   }
@@ -207,10 +254,18 @@ class DeviceBodyContacts {
     velocity_ = {points, name};
     velocity_.clear();
     share_ = {points, name};
-    touch_ = {rows, name};
+    is_active_ = {points, name};
+    const auto cleared = [](auto& array, std::size_t size) {
+      array = {size, name};
+      array.clear();
+    };
+    cleared(touch_, rows);
+    cleared(is_inside_, rows);
+    cleared(wakes_, rows);
+    cleared(way_, 1);
+    cleared(carries_, lists().near.size());
     response_ = {rows, name};
     force_ = {rows, name};
-    carries_ = {lists().near.size(), name};
     in_patch_ = {};
     if (lists().have_patches) {
       in_patch_ = {lists().near.size(), name};
@@ -258,9 +313,9 @@ class DeviceBodyContacts {
             .row = lists().rows.data(),
             .near_start = lists().near_start.data(),
             .near = lists().near.data(),
-            .row_of_entry = lists().row_of_entry.data(),
             .entries_of_start = lists().entries_of_start.data(),
             .entries_of = lists().entries_of.data(),
+            .rows_naming = lists().rows_naming.data(),
             .rows_from_start = lists().rows_from_start.data(),
             .rows_from = lists().rows_from.data(),
             .field = fields_.data(),
@@ -270,6 +325,11 @@ class DeviceBodyContacts {
             .carries = carries_.data(),
             .in_patch = in_patch_.data(),
             .share = share_.data(),
+            // What points of other devices do is not among the ways here.
+            .wakes = m_.share() ? nullptr : wakes_.data(),
+            .way = way_.data(),
+            .is_inside = is_inside_.data(),
+            .is_active = is_active_.data(),
             .dt = dt_};
   }
 
@@ -298,7 +358,9 @@ class DeviceBodyContacts {
   DeviceArray<SurfaceTouch> touch_;
   DeviceArray<SurfaceResponse> response_;
   DeviceArray<SurfaceForce> force_;
-  DeviceArray<double> share_;
+  DeviceArray<double> share_, wakes_;
+  DeviceArray<PointWay> way_;  // one
+  DeviceArray<char> is_inside_, is_active_;
 };
 
 }  // namespace phyxel::cuda

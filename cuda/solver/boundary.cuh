@@ -127,13 +127,14 @@ class Boundary {
   /// The loads that follow the surface.
   const DeviceFollowing<Real, StateReal>& following() const { return following_; }
   /// Moves phyxels to their prescribed positions after a step from `time` [s].
-  void follow_paths(double time, double dt) {
+  /// @param counts_work whether the step is added to the work of supports
+  void follow_paths(double time, double dt, bool counts_work) {
     prepare_work(dt);
     for (Moved& path : paths_) {
       const Path before = path.of->path_at(time), after = path.of->path_at(time + dt);
       const Vec3d x = path.origin, there = after.at(x);
       DeviceWork work;
-      if (!path.words.empty()) {
+      if (counts_work && !path.words.empty()) {
         const Path mean_step = path.of->mean_step(time, dt);
         work = {path.inertia.data(), {mean_step.at(x), mean_step.turn}, path.words.pointer()};
       }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "phyxel/physics/obstacles.hpp"
@@ -62,8 +63,9 @@ __device__ Vec3<double> free_axes_of(const LayerArrays<StateReal>& layer, int k)
 
 /// Moves a phyxel of the layer out of an obstacle if the step has led it into it.
 /// @param terms receives what is added to the obstacle's sums. @param is_last as of `keep_out`
+/// @returns true if it has
 template <class Shape, class Real, class StateReal>
-__device__ void keep_phyxel_out(const Fields<Real, StateReal>& f,
+__device__ bool keep_phyxel_out(const Fields<Real, StateReal>& f,
                                 const LayerArrays<StateReal>& layer, const Shape& shape,
                                 const ObstacleStep& obstacle, int k, bool is_last,
                                 ContactTerms& terms) {
@@ -83,7 +85,7 @@ __device__ void keep_phyxel_out(const Fields<Real, StateReal>& f,
   TouchingPoint point{layer.position[k] + u, v,
                       to<double>(before),    {free(0), free(1), free(2)},
                       layer.offset[k],       layer.inertia[k]};
-  if (!touch(shape, obstacle, point, terms)) return;
+  if (!touch(shape, obstacle, point, terms)) return false;
   displacement = to<StateReal>(u + obstacle.dt * (point.velocity - v));
   const Vec3<StateReal> changed = to<StateReal>(point.velocity);
   set_column3(f.velocity, f.places, at, changed);
@@ -93,6 +95,7 @@ __device__ void keep_phyxel_out(const Fields<Real, StateReal>& f,
   }
   record.u = to<Real>(displacement);
   f.points.set(at, record);
+  return true;
 }
 
 /// Moves phyxels that a step has led into an obstacle out of it, and adds to the obstacle's sums.
@@ -103,7 +106,9 @@ __global__ void keep_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
                          ObstacleStep obstacle, SumWords sums, bool is_last) {
   const int k = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   ContactTerms terms;
-  if (k < layer.count) keep_phyxel_out(f, layer, shape, obstacle, k, is_last, terms);
+  const bool touches =
+      k < layer.count && keep_phyxel_out(f, layer, shape, obstacle, k, is_last, terms);
+  if (!__any_sync(0xffffffff, touches)) return;
   for (int s = 0; s < ContactTerms::count; ++s) sums.add_of_warp(s, k, terms.value[s]);
 }
 
@@ -282,6 +287,20 @@ class Contacts {
   /// Sets the states of free bodies, as of `RigidBodies::put`.
   void put_rigid(std::span<const RigidState> states, double dt) { rigid_.put(states, dt); }
   const std::vector<RigidState>& rigid_states() const { return rigid_.states(); }
+  /// What a step changes, but for phyxels.
+  struct Kept {
+    RigidBodies::Kept rigid;
+    std::vector<ExactSum> sums;
+  };
+  Kept kept() const { return {rigid_.kept(), sums()}; }
+  /// Takes steps since then back.
+  void put_back(Kept kept) {
+    rigid_.put_back(std::move(kept.rigid));
+    for (std::size_t o = 0; o < sums_.size(); ++o) {
+      const auto first = kept.sums.begin() + static_cast<std::ptrdiff_t>(o * ContactTerms::count);
+      sums_[o].set({first, first + ContactTerms::count});
+    }
+  }
   /// The sums of each obstacle so far (`ContactTerms`). Waits for the steps in progress.
   std::vector<ExactSum> sums() const {
     std::vector<ExactSum> all;

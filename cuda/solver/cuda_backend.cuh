@@ -8,6 +8,7 @@
 
 #include "solver/body_contacts.cuh"
 #include "solver/cuda_backend.hpp"
+#include "solver/kept_motion.cuh"
 #include "solver/launch_path.cuh"
 #include "solver/passes.cuh"
 #include "solver/step_graph.cuh"
@@ -89,10 +90,7 @@ class CudaBackend final : public Backend {
 
   void step(std::int64_t first, double dt, int count, bool move_surfels) override {
     m_.use_device();
-    if (dt != m_.dt()) {
-      for (StepGraph& graph : graphs_) graph.forget();
-      m_.send_constants(dt);
-    }
+    set_step(dt);
     const SurfelAdvection<Real, StateReal>* surfels =
         move_surfels && has_surfels_ ? &surfels_of_model() : nullptr;
     while (count > 0) {
@@ -106,12 +104,36 @@ class CudaBackend final : public Backend {
   }
   std::vector<std::int64_t> step_sums() const override {
     m_.use_device();
-    StepSums sums = boundary_.support_work();
-    const StepSums of_obstacles = contacts_.sums();
-    sums.insert(sums.end(), of_obstacles.begin(), of_obstacles.end());
-    const StepSums of_bodies = body_contacts_.sums();
-    sums.insert(sums.end(), of_bodies.begin(), of_bodies.end());
-    return words_of(std::move(sums));
+    return words_of(
+        joined(joined(boundary_.support_work(), contacts_.sums()), body_contacts_.sums()));
+  }
+  std::optional<NextContacts> next_contacts(double time, double dt) override {
+    if (!contacts_.acts() && !body_contacts_.acts()) return std::nullopt;
+    m_.use_device();
+    set_step(dt);
+    contacts_.prepare(dt, 1);
+    passes_->receive_displacements();
+    const KeptMotion<Real, StateReal> motion(m_);
+    auto of_obstacles = contacts_.kept();
+    StepSums of_bodies = body_contacts_.sums();
+    add_loads(time);
+    passes_->stress(HistoryUse::trial, history_interval_);
+    contacts_.remember_velocities();
+    body_contacts_.begin_step(dt, *passes_);
+    NextContacts next;
+    next.depths = body_contacts_.depths();
+    advance_among_contacts(time, false);
+    StepSums sums = joined(contacts_.sums(), body_contacts_.sums());
+    add_words(sums, words_of(joined(of_obstacles.sums, of_bodies)), -1);
+    next.sums = words_of(std::move(sums));
+    next.of_bodies = body_contacts_.forces();
+    motion.put_back();
+    contacts_.put_back(std::move(of_obstacles));
+    body_contacts_.set_sums(std::move(of_bodies));
+    m_.wait();
+    // Another rank's next stresses must not arrive before all ranks have read these.
+    if (m_.share()) m_.share()->communicator->largest(0);
+    return next;
   }
   std::vector<RigidState> rigid_states() const override { return contacts_.rigid_states(); }
   int best_steps() const override {
@@ -336,29 +358,48 @@ class CudaBackend final : public Backend {
   /// Launches one step of the present size from a time [s].
   /// @param follows true right after another step of the same graph
   void launch_step(double time, const Advection* surfels, bool follows = false) {
-    boundary_.sum_loads(time);
-    if (!boundary_.following().empty()) {
-      passes_->receive_displacements();
-      boundary_.following().add(time, m_.loads());
-    }
+    add_loads(time);
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
     if (fresh_ || boundary_.changes() || contacts_.acts() || body_contacts_.acts()) {
       if (!follows || contacts_.pushes()) contacts_.remember_velocities();
       body_contacts_.begin_step(m_.dt(), *passes_);
-      body_contacts_.push_apart();
-      contacts_.push_phyxels(time);
-      passes_->advance(m_.dt());
-      boundary_.follow_paths(time, m_.dt());
-      if (fresh_) boundary_.put_held_at_rest();
-      body_contacts_.keep_apart();
-      contacts_.keep_phyxels_out(time);
+      advance_among_contacts(time, true);
       passes_->send_displacements();
     } else {
       passes_->advance_and_send(m_.dt());
     }
     fresh_ = false;
     if (surfels) surfels->launch(*passes_);
+  }
+  /// Sums the loads of a step from a time [s].
+  void add_loads(double time) {
+    boundary_.sum_loads(time);
+    if (boundary_.following().empty()) return;
+    passes_->receive_displacements();
+    boundary_.following().add(time, m_.loads());
+  }
+  /// Launches the second pass of a step from a time [s], with supports, obstacles and other bodies.
+  /// @param counts_work as of `Boundary::follow_paths`
+  void advance_among_contacts(double time, bool counts_work) {
+    body_contacts_.push_apart();
+    contacts_.push_phyxels(time);
+    passes_->advance(m_.dt());
+    boundary_.follow_paths(time, m_.dt(), counts_work);
+    if (fresh_) boundary_.put_held_at_rest();
+    body_contacts_.keep_apart();
+    contacts_.keep_phyxels_out(time);
+  }
+  /// Prepares for steps of `dt` [s].
+  void set_step(double dt) {
+    if (dt == m_.dt()) return;
+    for (StepGraph& graph : graphs_) graph.forget();
+    m_.send_constants(dt);
+  }
+  /// The sums of both.
+  static StepSums joined(StepSums sums, const StepSums& more) {
+    sums.insert(sums.end(), more.begin(), more.end());
+    return sums;
   }
   /// Returns the surfels, which are uploaded on the first call.
   Advection& surfels_of_model() {

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "check.hpp"
@@ -91,9 +92,10 @@ class DeviceSums {
   /// @param what the sums' name, for messages
   DeviceSums(int sums, unsigned accumulators, const std::string& what)
       : accumulators_(accumulators),
-        what_(what),
         earlier_(static_cast<std::size_t>(sums)),
-        words_(sent(zeros(), what)) {}
+        words_(earlier_.size() * ExactSum::words * accumulators_, what) {
+    words_.clear();
+  }
 
   bool empty() const { return earlier_.empty(); }
   std::size_t bytes() const { return words_.bytes(); }
@@ -108,8 +110,12 @@ class DeviceSums {
     terms_ += times * (static_cast<std::int64_t>(points) / accumulators_ + of_warp);
     if (terms_ < most_terms) return;
     wait();
-    earlier_ = sums();
-    words_ = sent(zeros(), what_);
+    set(sums());
+  }
+  /// Replaces the sums. Launches that a graph has recorded go on to add to them.
+  void set(std::vector<ExactSum> sums) {
+    earlier_ = std::move(sums);
+    words_.clear();
     terms_ = 0;
   }
   /// The sums so far. Call when no kernel is in progress.
@@ -131,12 +137,7 @@ class DeviceSums {
   }
 
  private:
-  std::vector<unsigned long long> zeros() const {
-    return std::vector<unsigned long long>(earlier_.size() * ExactSum::words * accumulators_);
-  }
-
   unsigned accumulators_ = 1;
-  std::string what_;
   std::vector<ExactSum> earlier_;  // of steps before the words were last cleared
   DeviceArray<unsigned long long> words_;
   std::int64_t terms_ = 0;  // largest number of terms in an accumulator

@@ -53,6 +53,12 @@ class ThreadGroup {
     }
     return own;
   }
+  __device__ double least(double own) const {
+    for (int way = size / 2; way > 0; way /= 2) {
+      own = fmin(own, __shfl_xor_sync(mask_, own, way));
+    }
+    return own;
+  }
   __device__ bool is_first() const { return thread_ == 0; }
 
  private:

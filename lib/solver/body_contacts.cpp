@@ -26,7 +26,7 @@ BodyContacts::BodyContacts(const Model& model, int threads)
 }
 
 void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
-  points_.find(position, dt);
+  points_.find(position, dt, watch_.skin());
   watch_.found(std::move(position), points_.reach());
   const std::size_t points = points_.sites().size(), rows = points_.rows().size();
   motion_.assign(points, {});
@@ -35,9 +35,12 @@ void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
   is_inside_.assign(rows, 0);
   responses_.assign(rows, {});
   row_forces_.assign(rows, {});
-  carries_.assign(points_.row_of_entry().size(), {});
+  carries_.assign(points_.near().indices.size(), {});
   in_patch_.assign(points_.have_patches() ? carries_.size() : 0, 1);
   shares_.assign(points, 0);
+  wakes_.assign(rows, 0);
+  place_.assign(points, {});
+  way_ = {};
   is_active_.assign(points, 0);
   forces_.assign(count(), {});
   totals_.assign(count(), {});
@@ -63,9 +66,9 @@ ContactPasses BodyContacts::passes() {
           .row = points_.rows().data(),
           .near_start = points_.near().offsets.data(),
           .near = points_.near().indices.data(),
-          .row_of_entry = points_.row_of_entry().data(),
           .entries_of_start = points_.entries_of().offsets.data(),
           .entries_of = points_.entries_of().indices.data(),
+          .rows_naming = points_.rows_naming().data(),
           .rows_from_start = points_.rows_from().offsets.data(),
           .rows_from = points_.rows_from().indices.data(),
           .field = fields_.data(),
@@ -75,17 +78,30 @@ ContactPasses BodyContacts::passes() {
           .carries = carries_.data(),
           .in_patch = in_patch_.empty() ? nullptr : in_patch_.data(),
           .share = shares_.data(),
+          .wakes = wakes_.data(),
+          .way = &way_,
+          .is_inside = is_inside_.data(),
           .dt = dt_};
+}
+
+void BodyContacts::find_way() {
+  double most = 0;
+#pragma omp parallel for schedule(static) reduction(max : most) num_threads(threads_here())
+  for (std::size_t p = 0; p < place_.size(); ++p) {
+    const Vec3d way = motion_[p].after - place_[p];
+    most = std::max(most, dot(way, way));
+    place_[p] = motion_[p].after;
+  }
+  way_.before += std::sqrt(most);
 }
 
 void BodyContacts::find_touches() {
   const ContactPasses passes = this->passes();
   const auto rows = static_cast<Index>(touches_.size());
-#pragma omp parallel for schedule(static) num_threads(threads_here())
+#pragma omp parallel for schedule(dynamic, 64) num_threads(threads_here())
   for (Index r = 0; r < rows; ++r) {
     passes.find_patch(OneThread{}, r);
     passes.find_touch(OneThread{}, r);
-    is_inside_[r] = touches_[r].is_inside;
   }
 }
 
@@ -186,10 +202,10 @@ std::size_t BodyContacts::bytes() const {
   }
   return distances + layer_.bytes() + points_.bytes() + sums_.size() * sizeof(ExactSum) +
          watch_.bytes() +
-         motion_.size() * (sizeof(SurfaceMotion) + sizeof(Vec3d) + sizeof(double)) +
+         motion_.size() * (sizeof(SurfaceMotion) + 2 * sizeof(Vec3d) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
          carries_.size() * sizeof(SurfaceShare) + in_patch_.size() +
-         2 * forces_.size() * sizeof(PointForces) +
+         wakes_.size() * sizeof(double) + 2 * forces_.size() * sizeof(PointForces) +
          (modulus_.size() + regain_.size()) * sizeof(double);
 }
 

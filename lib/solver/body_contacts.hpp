@@ -24,10 +24,11 @@ class TouchingPoints {
   explicit TouchingPoints(const SurfaceLayer& layer) : model_(layer.model()), layer_(layer) {}
 
   /// Finds them anew from places. Of a share: collective. @param dt size of the step [s]
-  void find(std::span<const Vec3d> position, double dt);
+  /// @param skin by which lists reach beyond ranges [m]
+  void find(std::span<const Vec3d> position, double dt, double skin);
 
-  /// As of `SurfaceLayer` [m].
-  double skin() const { return layer_.skin(); }
+  /// That of the lists [m].
+  double skin() const { return skin_; }
   /// The extents of bodies when points were found.
   const BodyReach& reach() const { return reach_; }
 
@@ -42,10 +43,11 @@ class TouchingPoints {
   const Csr& near() const { return rows_.near; }
   /// The points near the point of a row.
   std::span<const Index> near_row(std::size_t r) const { return rows_.near_row(r); }
-  std::span<const Index> row_of_entry() const { return row_of_entry_; }
   /// For each point, the entries that name it, in `contact_threads` lists, and the rows that belong
   /// to it, ascending.
   const Csr& entries_of() const { return entries_of_; }
+  /// The row of each of these entries.
+  std::span<const Index> rows_naming() const { return rows_naming_; }
   const Csr& rows_from() const { return rows_from_; }
   /// True if there are rows on any rank.
   bool any() const { return any_; }
@@ -72,6 +74,7 @@ class TouchingPoints {
 
   const Model& model_;
   const SurfaceLayer& layer_;
+  double skin_ = 0;  // [m]
   BodyReach reach_;
   PointExchange exchange_;
   std::vector<Index> own_;
@@ -79,8 +82,8 @@ class TouchingPoints {
   std::vector<Index> id_;  // of each point, in the whole model
   std::vector<Index> body_;
   ContactRows rows_;
-  std::vector<Index> row_of_entry_;
   Csr entries_of_, rows_from_;
+  std::vector<Index> rows_naming_;
   bool any_ = false;
 };
 
@@ -101,7 +104,7 @@ class BodyContacts {
   void begin_step(double dt, StateOf&& state_of) {
     if (!acts()) return;
     const std::vector<Index>& layer = model_.body_contact.layer.phyxels;
-    if (watch_.is_late(dt, points_.skin(), state_of)) {
+    if (watch_.is_late(dt, state_of)) {
       std::vector<Vec3d> position;
       position.reserve(layer.size());
       for (const Index i : layer) position.push_back(model_.position[i] + state_of(i).displacement);
@@ -131,6 +134,7 @@ class BodyContacts {
     forget_totals();
     for (std::size_t p = 0; p < count(); ++p) motion_[p].after = motion_[p].before;
     points_.refresh(motion_);
+    find_way();
     find_touches();
     find_active();
     find_pushes();
@@ -209,7 +213,10 @@ class BodyContacts {
     }
     points_.refresh(motion_);
     points_.refresh(velocity_);
+    find_way();
   }
+  /// Adds to the way of points.
+  void find_way();
   void forget_totals() {
     for (const Index p : own_active_) totals_[p] = {};
   }
@@ -274,6 +281,9 @@ class BodyContacts {
   std::vector<char> in_patch_;              // shape [entries]; empty if there are no patches
   std::vector<SurfaceForce> row_forces_;    // shape [rows]
   std::vector<double> shares_;              // c of each point
+  std::vector<double> wakes_;               // of each row
+  std::vector<Vec3d> place_;                // of each point, as of `way_` [m]
+  PointWay way_;
   std::vector<PointForces> forces_;         // on this rank's points, of the active ones
   std::vector<PointForces> totals_;         // the same of all sweeps of a step
   std::vector<char> is_inside_;             // of each row

@@ -101,7 +101,7 @@ void BodyPenalty::add_friction(const std::vector<Vec3d>& of_rows, std::vector<Ve
     }
     const Offset* start = of.offsets.data() + contact_threads * p;
     for (Offset k = start[0]; k < start[contact_threads]; ++k) {
-      const Index e = of.indices[k], r = points_.row_of_entry()[e];
+      const Index e = of.indices[k], r = points_.rows_naming()[k];
       if (!(carries_[e].weight > 0)) continue;
       SurfaceForce whole;
       whole.set_friction(touches_[r], of_rows[r]);

@@ -41,7 +41,7 @@ void BodyPenalty::find_points(const Vector& u) {
   if (model_.share) moved = model_.share->communicator->largest(moved);
   if (moved <= 0.5 * points_.skin()) return;
   found_at_ = std::move(now);
-  points_.find(found_at_, 1);
+  points_.find(found_at_, 1, layer_.least_skin());
   modulus_ = points_.wave_moduli();
   knows_points_ = true;
   knows_shapes_ = knows_expected_ = false;
@@ -53,7 +53,7 @@ void BodyPenalty::find_points(const Vector& u) {
 /// end.
 void BodyPenalty::find_touches() {
   std::vector<SurfaceTouch> touches(points_.rows().size());
-  std::vector<SurfaceShare> carries(points_.row_of_entry().size());
+  std::vector<SurfaceShare> carries(points_.near().indices.size());
   std::vector<char> in_patch(points_.have_patches() ? carries.size() : 0, 1);
   const ContactPasses passes{.site = points_.sites().data(),
                              .motion = motion_.data(),
@@ -197,7 +197,7 @@ std::vector<Vec3d> BodyPenalty::spread(const std::vector<double>& push) const {
     }
     const Offset* start = of.offsets.data() + contact_threads * p;
     for (Offset k = start[0]; k < start[contact_threads]; ++k) {
-      const Index e = of.indices[k], r = points_.row_of_entry()[e];
+      const Index e = of.indices[k], r = points_.rows_naming()[k];
       force[p] += -carries_[e].part * push[r] * touches_[r].normal;
     }
   }

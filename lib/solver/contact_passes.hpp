@@ -24,10 +24,18 @@ struct PointForces {
   PHYXEL_HD Vec3<double> sum() const { return normal + tangential; }
 };
 
+/// How far points have moved since lists were found.
+struct PointWay {
+  double before = 0;   ///< The sum over earlier steps of the largest way of a point [m].
+  double in_step = 0;  ///< The largest way in this step [m].
+
+  PHYXEL_HD double sum() const { return before + in_step; }
+};
+
 /// The arrays of the passes. Whoever fills them runs `find_patch` and `find_touch` for all rows,
-/// `find_share` for all points, and `find_response` for all rows; then, in each sweep, `find_force`
-/// for all rows and `forces_on` for its own points, whose velocities it changes. Each is run by one
-/// thread (`OneThread`) or by a group that shares the work.
+/// `find_share` for all points on which forces may act, and `find_response` for all rows; then, in
+/// each sweep, `find_force` for all rows and `forces_on` for its own points, whose velocities it
+/// changes. Each is run by one thread (`OneThread`) or by a group that shares the work.
 struct ContactPasses {
   const SurfaceSite* site = nullptr;  ///< Shape [points], as all others of points.
   const SurfaceMotion* motion = nullptr;
@@ -36,11 +44,11 @@ struct ContactPasses {
   /// Entries of each row, the points near it: the parts of its list (`contact_threads`) start at
   /// near_start.
   const Offset* near_start = nullptr;
-  const Index* near = nullptr;          ///< Of each entry: its point.
-  const Index* row_of_entry = nullptr;  ///< Of each entry: its row.
+  const Index* near = nullptr;  ///< Of each entry: its point.
   /// Entries that name each point, in parts, too.
   const Offset* entries_of_start = nullptr;
   const Index* entries_of = nullptr;
+  const Index* rows_naming = nullptr;  ///< Of each of these: its row.
   /// Rows that belong to each point, not in parts.
   const Offset* rows_from_start = nullptr;
   const Index* rows_from = nullptr;
@@ -52,7 +60,14 @@ struct ContactPasses {
   /// Of each entry: true if it is of its row's patch; null if no point is beside several.
   char* in_patch = nullptr;
   double* share = nullptr;  ///< c of each point [m²].
-  double dt = 0;            ///< [s]
+  /// Of each row: the way of all points up to which none of its list can come within range [m]. A
+  /// row is asleep until then: its point is outside. Null: rows do not sleep.
+  double* wakes = nullptr;
+  const PointWay* way = nullptr;  ///< If rows sleep.
+  char* is_inside = nullptr;      ///< Of each row: receives true if its point is inside.
+  /// Of each point: receives true if a force may act on it. Null: that is not asked.
+  char* is_active = nullptr;
+  double dt = 0;  ///< [s]
   /// As of `surface_touch`. By default a point has to be inside by more than rounding.
   double reach = -1e-9;
 
@@ -68,27 +83,40 @@ struct ContactPasses {
   template <class Threads>
   PHYXEL_HD void find_patch(const Threads& threads, Index r) const {
     const ContactRow& here = row[r];
-    if (here.patches == 1) return;
+    if (here.patches == 1 || is_asleep(r)) return;
     const SurfacePatches patches(threads, site[here.point], motion[here.point], entries_of_row(r),
                                  sites(), motions(), here.patches);
     threads.each(entries_of_row(r), [&](Offset e) {
       in_patch[e] = here.patch < patches.count() && patches.of(site[near[e]].rest) == here.patch;
-      carries[e] = {};
     });
   }
   template <class Threads>
   PHYXEL_HD void find_touch(const Threads& threads, Index r) const {
+    if (is_asleep(r)) return;
     const ContactRow& here = row[r];
+    if (touch[r].is_inside) threads.each(entries_of_row(r), [&](Offset e) { carries[e] = {}; });
     const SurfaceTouch found = surface_touch(
         OfPatch(threads, in_patch), site[here.point], motion[here.point], entries_of_row(r),
         sites(), motions(), field[here.body], here.apart, reach, carries);
-    if (threads.is_first()) touch[r] = found;
+    if (is_active && found.is_inside) {
+      threads.each(entries_of_row(r), [&](Offset e) {
+        if (carries[e].weight > 0) is_active[near[e]] = 1;
+      });
+    }
+    const double wakes_at = wakes && found.is_alone ? waking_of(threads, r) : 0;
+    if (!threads.is_first()) return;
+    touch[r] = found;
+    if (is_inside) is_inside[r] = found.is_inside;
+    if (is_active && found.is_inside) is_active[here.point] = 1;
+    if (wakes) wakes[r] = wakes_at;
   }
   template <class Threads>
   PHYXEL_HD void find_share(const Threads& threads, Index p) const {
+    if (is_active && !is_active[p]) return;
     double area = 0;
-    threads.each(entries_of_start + contact_threads * static_cast<Offset>(p),
-                 [&](Offset k) { area += carries[entries_of[k]].area; });
+    threads.each(entries_of_start + contact_threads * static_cast<Offset>(p), [&](Offset k) {
+      if (is_inside[rows_naming[k]]) area += carries[entries_of[k]].area;
+    });
     area = threads.sum(area);
     if (!threads.is_first()) return;
     for (Offset k = rows_from_start[p]; k < rows_from_start[p + 1]; ++k) {
@@ -127,9 +155,8 @@ struct ContactPasses {
   PHYXEL_HD PointForces forces_on(const Threads& threads, Index p) const {
     PointForces sum;
     threads.each(entries_of_start + contact_threads * static_cast<Offset>(p), [&](Offset k) {
-      const Index e = entries_of[k];
-      if (!(carries[e].weight > 0)) return;
-      const Index r = row_of_entry[e];
+      const Index e = entries_of[k], r = rows_naming[k];
+      if (!is_inside[r] || !(carries[e].weight > 0)) return;
       sum.normal += force[r].normal_reaction(touch[r], carries[e]);
       sum.tangential += force[r].tangential_reaction(touch[r], carries[e], motion[p].before);
     });
@@ -149,6 +176,23 @@ struct ContactPasses {
   }
 
  protected:
+  /// True if a row sleeps in this step.
+  PHYXEL_HD bool is_asleep(Index r) const { return wakes && way->sum() < wakes[r]; }
+  /// The way of all points at which one of a row's list may come within range; they may move by as
+  /// much as its point.
+  template <class Threads>
+  PHYXEL_HD double waking_of(const Threads& threads, Index r) const {
+    const Index p = row[r].point;
+    double least = no_square;
+    threads.each(entries_of_row(r), [&](Offset e) {
+      const Vec3<double> apart = motion[near[e]].after - motion[p].after;
+      const double distance = std::sqrt(dot(apart, apart));
+      const double left = distance - common_range(site[p].range, site[near[e]].range);
+      if (left < least) least = left;
+    });
+    constexpr double almost_half = 0.499;  // by rounding
+    return way->sum() + almost_half * threads.least(least);
+  }
   PHYXEL_HD const Offset* entries_of_row(Index r) const {
     return near_start + contact_threads * static_cast<Offset>(r);
   }

@@ -23,79 +23,115 @@ double largest_difference(const Box& a, const Box& b) {
                     along(a.low.z, a.high.z, b.low.z, b.high.z)});
 }
 
+/// True if a box has a point.
+bool is_filled(const Box& box) { return box.low.x <= box.high.x; }
+
 /// The largest length of the vectors of a box, 0 for the box of none.
-double largest_in(const Box& box) {
-  return box.low.x > box.high.x ? 0 : largest_difference(box, {});
-}
+double largest_in(const Box& box) { return is_filled(box) ? largest_difference(box, {}) : 0; }
+
+/// The factor by which speeds may grow until the next look.
+constexpr double speeds_may_grow = 2;
 
 }  // namespace
-
-bool ContactWatch::look(const Model& model, double moved, double fastest, double skin, double dt) {
-  if (model.share) {
-    moved = model.share->communicator->largest(moved);
-    fastest = model.share->communicator->largest(fastest);
-  }
-  // Speeds may double until the next look.
-  const double way = 2 * fastest * dt, most = 0.5 * skin;
-  const bool is_late = generation_ == 0 || dt != dt_ || moved + way > most;
-  if (is_late) {
-    moved = 0;
-    ++generation_;
-  }
-  dt_ = dt;
-  const double steps = (most - moved) / std::max(way, 1e-300);
-  left_ = static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(rarest_)));
-  return is_late;
-}
 
 LayerWatch::LayerWatch(const SurfaceLayer& layer, int threads, int rarest)
     : layer_(layer),
       threads_(std::clamp(static_cast<int>(layer.phyxels().size() / 4000), 1, threads)),
       watch_(rarest),
+      skin_(layer.least_skin()),
       ways_(layer.groups().size()) {}
 
-bool LayerWatch::is_late_on_ranks(double dt, double skin) {
+void LayerWatch::set_skin(double speed, double dt) {
+  const int steps = 4 * watch_.rarest() + 8;  // some looks, and some steps more
+  // On the host, longer lists cost more than rarer searches save.
+  const double widest = (watch_.rarest() > 1 ? 1 : 0.5) * layer_.most_skin();
+  skin_ = std::clamp(speeds_may_grow * speed * steps * dt, layer_.least_skin(), widest);
+}
+
+// Phyxels move by half a skin each. Speeds may grow until the next look.
+bool LayerWatch::is_late_on_ranks(double dt) {
   double moved = 0, fastest = 0;
   for (const SurfaceWay& way : ways_) {
     moved = std::max(moved, largest_in(way.moved));
     fastest = std::max(fastest, largest_in(way.speeds));
   }
-  return watch_.look(layer_.model(), moved, fastest, skin, dt);
+  const Communicator& ranks = *layer_.model().share->communicator;
+  moved = ranks.largest(moved);
+  fastest = ranks.largest(fastest);
+  const double way = speeds_may_grow * fastest * dt;
+  const bool is_late = !watch_.has_found(dt) || moved + way > 0.5 * skin_;
+  if (is_late) {
+    moved = 0;
+    watch_.renew(dt);
+    set_skin(2 * fastest, dt);
+  }
+  watch_.put_off((0.5 * skin_ - moved) / std::max(way, 1e-300));
+  return is_late;
 }
 
-bool LayerWatch::is_late_here(double dt, double skin) {
-  const bool is_late = !watch_.has_found(dt) || have_come_near(dt, skin);
-  if (is_late) watch_.renew(dt);
+bool LayerWatch::is_late_here(double dt) {
+  const bool is_late = !watch_.has_found(dt) || have_come_near(dt);
+  if (is_late) {
+    watch_.renew(dt);
+    set_skin(fastest_meeting(), dt);
+  }
   watch_.put_off();
   return is_late;
 }
 
-// Until the next look, the speeds of bodies against each other may double.
-bool LayerWatch::have_come_near(double dt, double skin) const {
-  const BodyContact& contact = layer_.model().body_contact;
-  std::vector<Box> ways(reach_.boxes.size(), no_box);  // up to the next look
-  const double span = watch_.rarest() * dt;
+std::vector<Box> LayerWatch::of_bodies(Box SurfaceWay::*of_group) const {
+  std::vector<Box> all(reach_.boxes.size(), no_box);
   for (std::size_t g = 0; g < ways_.size(); ++g) {
-    const Box way = sum_of(ways_[g].moved, ways_[g].speeds, 2 * span);
-    Box& of_body = ways[layer_.bodies()[layer_.groups()[g].begin]];
-    extend(of_body, way.low);
-    extend(of_body, way.high);
+    const Box& box = ways_[g].*of_group;
+    Box& of_body = all[layer_.bodies()[layer_.groups()[g].begin]];
+    extend(of_body, box.low);
+    extend(of_body, box.high);
   }
+  return all;
+}
+
+double LayerWatch::fastest_meeting() const {
+  if (reach_.boxes.empty()) return 0;  // points have not been found yet
+  const std::vector<Box> speeds = of_bodies(&SurfaceWay::speeds),
+                         moved = of_bodies(&SurfaceWay::moved);
   std::vector<Box> boxes = reach_.boxes;
   for (std::size_t b = 0; b < boxes.size(); ++b) {
-    if (boxes[b].low.x <= boxes[b].high.x) boxes[b] = sum_of(boxes[b], ways[b]);
+    if (is_filled(boxes[b])) boxes[b] = grown(sum_of(boxes[b], moved[b]), 0.5 * layer_.most_skin());
+  }
+  double fastest = 0;
+  const auto look_at = [&](std::size_t a, std::size_t b) {
+    fastest = std::max(fastest, largest_difference(speeds[a], speeds[b]));
+  };
+  for_each_overlap(boxes, look_at);
+  for (std::size_t b = 0; b < boxes.size() && layer_.model().body_contact.self; ++b) {
+    if (is_filled(boxes[b])) look_at(b, b);
+  }
+  return fastest;
+}
+
+// Until the next look, the speeds of bodies against each other may grow.
+bool LayerWatch::have_come_near(double dt) const {
+  const BodyContact& contact = layer_.model().body_contact;
+  const double span = watch_.rarest() * dt;
+  std::vector<Box> ways = of_bodies(&SurfaceWay::moved);  // up to the next look
+  const std::vector<Box> speeds = of_bodies(&SurfaceWay::speeds);
+  std::vector<Box> boxes = reach_.boxes;
+  for (std::size_t b = 0; b < boxes.size(); ++b) {
+    if (!is_filled(boxes[b])) continue;
+    ways[b] = sum_of(ways[b], speeds[b], speeds_may_grow * span);
+    boxes[b] = sum_of(boxes[b], ways[b]);
   }
   bool is_late = false;
   const auto look_at = [&](std::size_t a, std::size_t b) {
     const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
     const std::vector<Index>& near = reach_.partners[a];
     const bool were_near = std::binary_search(near.begin(), near.end(), second);
-    is_late = is_late || (were_near ? largest_difference(ways[a], ways[b]) > skin
+    is_late = is_late || (were_near ? largest_difference(ways[a], ways[b]) > skin_
                                     : contact.law_of(first, second) != nullptr);
   };
   for_each_overlap(boxes, look_at);
   for (std::size_t b = 0; b < boxes.size() && contact.self; ++b) {
-    if (boxes[b].low.x <= boxes[b].high.x) look_at(b, b);
+    if (is_filled(boxes[b])) look_at(b, b);
   }
   return is_late;
 }

@@ -1,6 +1,8 @@
 /// When points of surfaces that may touch other bodies have to be found anew.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <utility>
 #include <vector>
@@ -25,10 +27,6 @@ class ContactWatch {
   explicit ContactWatch(int rarest) : rarest_(rarest) {}
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
-  /// Returns true if points have to be found anew. Of a share: collective.
-  /// @param moved how far the phyxels of the layer have moved since the last time [m]
-  /// @param fastest their largest speed [m/s]
-  bool look(const Model& model, double moved, double fastest, double skin, double dt);
   /// True if points have been found for steps of `dt` [s].
   bool has_found(double dt) const { return generation_ > 0 && dt == dt_; }
   /// Notes that points are found anew for steps of `dt` [s].
@@ -36,11 +34,13 @@ class ContactWatch {
     ++generation_;
     dt_ = dt;
   }
-  /// Puts the next look off as long as that may be.
-  void put_off() { left_ = rarest_; }
+  /// Puts the next look off by some steps, one at least, as far as that may be.
+  void put_off(double steps = HUGE_VAL) {
+    left_ = static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(rarest_)));
+  }
   /// Most steps between two looks.
   int rarest() const { return rarest_; }
-  /// How often they had to be.
+  /// How often points had to be found.
   std::int64_t generation() const { return generation_; }
 
  private:
@@ -69,14 +69,14 @@ class LayerWatch {
   bool is_due(double dt) { return watch_.is_due(dt); }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param ways of the groups since points were found; not looked at before that
-  bool is_late_by(std::vector<SurfaceWay> ways, double dt, double skin) {
+  bool is_late_by(std::vector<SurfaceWay> ways, double dt) {
     ways_ = std::move(ways);
-    return layer_.model().share ? is_late_on_ranks(dt, skin) : is_late_here(dt, skin);
+    return layer_.model().share ? is_late_on_ranks(dt) : is_late_here(dt);
   }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
-  /// @param skin as of `TouchingPoints` [m]. @param state_of returns the state of a phyxel
+  /// @param state_of returns the state of a phyxel
   template <class StateOf>
-  bool is_late(double dt, double skin, StateOf&& state_of) {
+  bool is_late(double dt, StateOf&& state_of) {
     if (!found_at_.empty()) {
 #pragma omp parallel for schedule(static) num_threads(threads_)
       for (std::size_t g = 0; g < ways_.size(); ++g) {
@@ -90,8 +90,12 @@ class LayerWatch {
         ways_[g] = way;
       }
     }
-    return is_late_by(std::move(ways_), dt, skin);
+    return is_late_by(std::move(ways_), dt);
   }
+  /// The skin of the lists that are to be found [m], once `is_late` has asked for them: it lasts
+  /// for some tens of steps, within the bounds of the layer. Fast bodies need a wide one; a wide
+  /// one costs time in each step.
+  double skin() const { return skin_; }
   /// Notes where bodies are when points are found.
   void found(const BodyReach& reach) { reach_ = reach; }
   /// Notes their phyxels' places, too, which `is_late` with states looks at [m], shape [layer].
@@ -104,14 +108,21 @@ class LayerWatch {
   std::size_t bytes() const { return found_at_.size() * sizeof(Vec3d); }
 
  private:
-  bool is_late_on_ranks(double dt, double skin);
-  bool is_late_here(double dt, double skin);
+  bool is_late_on_ranks(double dt);
+  bool is_late_here(double dt);
+  /// The ways of bodies, or their velocities, from those of groups.
+  std::vector<Box> of_bodies(Box SurfaceWay::*of_group) const;
   /// True if bodies may touch in the next step at places that are not among the points.
-  bool have_come_near(double dt, double skin) const;
+  bool have_come_near(double dt) const;
+  /// The largest speed of bodies against each other that may soon be near each other [m/s].
+  double fastest_meeting() const;
+  /// Sets the skin for bodies that move against each other at a speed [m/s].
+  void set_skin(double speed, double dt);
 
   const SurfaceLayer& layer_;
   int threads_;
   ContactWatch watch_;
+  double skin_;                   // [m]
   std::vector<Vec3d> found_at_;   // [m], shape [layer]
   std::vector<SurfaceWay> ways_;  // of each group
   BodyReach reach_;               // when points were found

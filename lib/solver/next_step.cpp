@@ -38,8 +38,19 @@ State next_state(const Model& model, const SupportInstant& now, const State& sta
 
 }  // namespace
 
+std::optional<NextStep> next_step_of_device(Backend& backend, double time, double dt) {
+  std::optional<NextContacts> tried = backend.next_contacts(time, dt);
+  if (!tried) return std::nullopt;
+  NextStep next{{}, std::move(tried->depths), std::move(tried->of_bodies)};
+  add_words(next.sums, tried->sums);
+  return next;
+}
+
 NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
                    const State& state) {
+  if (auto of_device = next_step_of_device(backend, now.time, now.dt)) {
+    return std::move(*of_device);
+  }
   StepContacts contacts(model, host_threads(backend));
   BodyContacts bodies(model, host_threads(backend));
   const std::vector<Index>& layer =

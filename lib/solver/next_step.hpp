@@ -1,6 +1,7 @@
 /// What bodies and obstacles do in the next of Verlet's steps, without taking it.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "phyxel/backend.hpp"
@@ -18,6 +19,11 @@ struct NextStep {
   /// motion, and their supports bear them.
   std::vector<Vec3d> of_bodies;
 };
+
+/// Finds it on the backend's device; nothing where that is left to the host. Of a share:
+/// collective.
+/// @param time present time [s]. @param dt size of the step [s]
+std::optional<NextStep> next_step_of_device(Backend& backend, double time, double dt);
 
 /// Finds it from the present state. Of a share: collective.
 /// @param now instant of `PresentForces`. @param state the present state

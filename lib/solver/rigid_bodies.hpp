@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "phyxel/model.hpp"
@@ -27,6 +28,18 @@ class RigidBodies {
   /// @throws InputError for another number of states than of free bodies
   void put(std::span<const RigidState> states, double dt);
   const std::vector<RigidState>& states() const { return states_; }
+
+  /// What a step changes.
+  struct Kept {
+    std::vector<RigidState> states;
+    StepSums earlier;
+  };
+  Kept kept() const { return {states_, earlier_}; }
+  /// Takes steps since then back.
+  void put_back(Kept kept) {
+    states_ = std::move(kept.states);
+    earlier_ = std::move(kept.earlier);
+  }
 
   /// Moves the bodies over the step from `time` [s].
   void begin_step(double time, double dt);

@@ -19,8 +19,6 @@
 namespace phyxel {
 namespace {
 
-constexpr double share_of_range = 0.25;  // of the skin
-
 /// The sine of the angle by which a body's surface falls away beside a place, as it does from edges
 /// and corners. @param normal of the surface there. @param spacing of phyxels [m]
 double fall_beside(const PlacedDistances& own, Vec3d place, Vec3d normal, double spacing) {
@@ -92,7 +90,7 @@ SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
   for (const SurfaceSite& site : sites_) least = std::min(least, site.range);
   groups_ = groups_of(model, model.body_contact.layer);
   if (model.share) least = model.share->communicator->smallest(least);
-  skin_ = share_of_range * least;
+  least_range_ = least;
 }
 
 std::vector<double> SurfaceLayer::gains(double dt) const {
@@ -127,12 +125,12 @@ Box SurfaceLayer::box_of(const LayerGroup& group, std::span<const Vec3d> positio
   return box;
 }
 
-BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position) const {
+BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position, double skin) const {
   return reach_of(
-      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }));
+      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }), skin);
 }
 
-BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes) const {
+BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, double skin) const {
   const Phase phase("bodies near each other");
   BodyReach reach{.boxes = std::vector(model_.body_contact.distances.size(), no_box),
                   .partners = {}};
@@ -151,7 +149,7 @@ BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes) const {
     }
   }
   std::vector<Box> with_skin;
-  for (const Box& box : reach.boxes) with_skin.push_back(grown(box, 0.5 * skin_));
+  for (const Box& box : reach.boxes) with_skin.push_back(grown(box, 0.5 * skin));
   reach.partners = partners_of_bodies(model_.body_contact, with_skin);
   return reach;
 }

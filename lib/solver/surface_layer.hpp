@@ -35,8 +35,10 @@ class SurfaceLayer {
   const std::vector<Index>& bodies() const { return bodies_; }
   /// Groups of the layer, in its order.
   const std::vector<LayerGroup>& groups() const { return groups_; }
-  /// The skin [m]: contact lists stay valid until a phyxel has moved by half of it.
-  double skin() const { return skin_; }
+  /// The smallest and the largest skin [m]: contact lists stay valid until phyxels have moved by it
+  /// against each other.
+  double least_skin() const { return 0.25 * least_range_; }
+  double most_skin() const { return least_range_; }
 
   /// The change of velocity of each by a force over a step of `dt` [s], along free axes [m/s/N].
   std::vector<double> gains(double dt) const;
@@ -48,9 +50,9 @@ class SurfaceLayer {
   /// The box of a group, grown by the ranges of its phyxels. @param position shape [phyxels] [m]
   Box box_of(const LayerGroup& group, std::span<const Vec3d> position) const;
   /// The extents of bodies. Of a share: collective. @param boxes of the groups (`box_of`)
-  BodyReach reach_of(std::span<const Box> boxes) const;
+  BodyReach reach_of(std::span<const Box> boxes, double skin) const;
   /// The same from places [m], shape [phyxels].
-  BodyReach reach_at(std::span<const Vec3d> position) const;
+  BodyReach reach_at(std::span<const Vec3d> position, double skin) const;
 
   std::size_t bytes() const {
     return sites_.size() * sizeof(SurfaceSite) + bodies_.size() * sizeof(Index);
@@ -61,7 +63,7 @@ class SurfaceLayer {
   std::vector<SurfaceSite> sites_;
   std::vector<Index> bodies_;
   std::vector<LayerGroup> groups_;
-  double skin_ = 0;
+  double least_range_ = 0;  // of all phyxels [m]
 };
 
 }  // namespace phyxel

@@ -35,7 +35,7 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
     SurfaceSite site = layer_.sites()[k];
     const std::vector<Index>& others = reach_.partners[body];
     if (std::none_of(others.begin(), others.end(), [&](Index b) {
-          return may_be_near(position[k], site.range, skin(), reach_.boxes[b]);
+          return may_be_near(position[k], site.range, skin_, reach_.boxes[b]);
         })) {
       continue;
     }
@@ -46,11 +46,12 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
   return of_all_ranks(model_, std::move(some));
 }
 
-void TouchingPoints::find(std::span<const Vec3d> position, double dt) {
+void TouchingPoints::find(std::span<const Vec3d> position, double dt, double skin) {
   const Phase phase("points that may touch");
-  reach_ = layer_.reach_at(position);
+  skin_ = skin;
+  reach_ = layer_.reach_at(position, skin);
   const std::vector<ContactCandidate> all = candidates(position, dt);
-  ContactRows found = find_rows(model_.body_contact, all, skin());
+  ContactRows found = find_rows(model_.body_contact, all, skin);
   any_ = !found.rows.empty();
   keep_what_counts(all, std::move(found));
   invert();
@@ -107,18 +108,20 @@ void TouchingPoints::keep_what_counts(const std::vector<ContactCandidate>& all, 
 
 void TouchingPoints::invert() {
   std::vector<std::pair<Index, Index>> of, from;
-  row_of_entry_.clear();
+  std::vector<Index> row_of_entry;
   for (std::size_t r = 0; r < rows_.rows.size(); ++r) {
     const Index point = rows_.rows[r].point;
     from.emplace_back(point, static_cast<Index>(r));
     for (const Index k : rows_.near_row(r)) {
       of.emplace_back(contact_threads * k + id_[point] % contact_threads,
-                      static_cast<Index>(row_of_entry_.size()));
-      row_of_entry_.push_back(static_cast<Index>(r));
+                      static_cast<Index>(row_of_entry.size()));
+      row_of_entry.push_back(static_cast<Index>(r));
     }
   }
   entries_of_ = grouped(contact_threads * site_.size(), of);
   rows_from_ = grouped(site_.size(), from);
+  rows_naming_ = tabulated(row_of_entry.size(),
+                           [&](std::size_t k) { return row_of_entry[entries_of_.indices[k]]; });
 }
 
 std::vector<double> TouchingPoints::wave_moduli() const {
@@ -134,7 +137,7 @@ std::vector<double> TouchingPoints::of_own(const std::vector<double>& of_layer) 
 
 std::size_t TouchingPoints::bytes() const {
   return site_.size() * sizeof(SurfaceSite) + rows_.rows.size() * sizeof(ContactRow) +
-         (own_.size() + 2 * id_.size() + 3 * row_of_entry_.size() + rows_.rows.size()) *
+         (own_.size() + 2 * id_.size() + 3 * rows_naming_.size() + rows_.rows.size()) *
              sizeof(Index) +
          (rows_.near.offsets.size() + entries_of_.offsets.size() + rows_from_.offsets.size()) *
              sizeof(Offset);

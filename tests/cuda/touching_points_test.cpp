@@ -82,15 +82,16 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
   int patches = 0;
   for (int search = 0; search < 3; ++search) {
     const double dt = search < 2 ? 1e-4 : 2e-4;
-    host.find(position, dt);
-    device.find(sent(position), dt);
+    const double skin = search == 1 ? layer.most_skin() : layer.least_skin();
+    host.find(position, dt, skin);
+    device.find(sent(position), dt, skin);
     EXPECT_EQ(device.any(), host.any());
     expect_same(host.own(), device.own().layer, "numbers in the layer");
     expect_same(host.sites(), device.lists().site, "sites");
     expect_same(host.ids(), device.lists().id, "ids");
     expect_same(host.near().indices, device.lists().near, "entries");
     expect_same(host.near().offsets, device.lists().near_start, "starts of rows");
-    expect_same(host.row_of_entry(), device.lists().row_of_entry, "rows of entries");
+    expect_same(host.rows_naming(), device.lists().rows_naming, "rows of entries");
     expect_same(host.entries_of().indices, device.lists().entries_of, "entries of points");
     expect_same(host.entries_of().offsets, device.lists().entries_of_start, "their starts");
     expect_same(host.rows_from().indices, device.lists().rows_from, "rows of points");

@@ -26,6 +26,16 @@ struct Exchanges {
   Traffic traffic;        ///< Of this rank, since the start.
 };
 
+/// What bodies and obstacles would do in a step, of one rank.
+struct NextContacts {
+  /// Words of exact sums, as of `Backend::step_sums` without those of motions.
+  std::vector<std::int64_t> sums;
+  std::vector<double> depths;  ///< Now, of the deepest phyxel of each body in other bodies [m].
+  /// Forces of other bodies on each phyxel that a step finds only at its end [N], shape [n]; empty
+  /// if bodies do not touch each other.
+  std::vector<Vec3d> of_bodies;
+};
+
 /// A model, at rest or deformed, as Lanczos' iteration sees it: three vectors of three numbers a
 /// phyxel, on one device, and S = M^-1/2 K M^-1/2, whose eigenvalues are the squared
 /// eigenfrequencies. K and M are those of the free components: supports prescribe the others, whose
@@ -124,6 +134,12 @@ class Backend {
   /// t + dt adds its reactions times half the displacements over both steps beside t. Empty if no
   /// phyxel moves on a prescribed path, and then steps cost nothing more.
   virtual std::vector<std::int64_t> step_sums() const { return {}; }
+  /// What bodies and obstacles would do in the step of `dt` [s] from `time` [s], which is tried and
+  /// taken back; nothing where that is left to the host (`next_step`). Of a share: collective.
+  virtual std::optional<NextContacts> next_contacts([[maybe_unused]] double time,
+                                                    [[maybe_unused]] double dt) {
+    return std::nullopt;
+  }
   /// The states of the free rigid bodies, as of `State::rigid`; the same on all ranks.
   virtual std::vector<RigidState> rigid_states() const { return {}; }
 

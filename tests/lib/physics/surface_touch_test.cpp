@@ -169,18 +169,15 @@ TEST_F(Patches, ShareTheEntriesOfAPointAmongItsRows) {
     rows.push_back({.patch = patch, .patches = most_patches});
     for (int thread = 0; thread < contact_threads; ++thread) start.push_back(3 * (patch + 1));
   }
-  std::vector<SurfaceShare> carries(near.size(), {.weight = 1, .part = 1, .area = 1});
   std::vector<char> in_patch(near.size(), 1);
   const ContactPasses passes{.site = sites_.data(),
                              .motion = motions_.data(),
                              .row = rows.data(),
                              .near_start = start.data(),
                              .near = near.data(),
-                             .carries = carries.data(),
                              .in_patch = in_patch.data()};
   for (Index r = 0; r < most_patches; ++r) passes.find_patch(OneThread{}, r);
   EXPECT_EQ(in_patch, (std::vector<char>{0, 0, 1, 1, 1, 0, 0, 0, 0}));
-  for (const SurfaceShare& share : carries) EXPECT_EQ(share.part, 0);
 }
 
 TEST_F(Patches, MayBeSeveralIfPhyxelsAreFarFromOthers) {

@@ -128,7 +128,6 @@ struct Watched {
   Model model;
   SurfaceLayer layer{model};
   LayerWatch watch{layer, 1};
-  double skin = layer.skin();
   std::vector<Vec3d> way, velocity;  // of each body
 
   explicit Watched(const std::vector<Vec3d>& places) : model(model_of(places)) {
@@ -147,12 +146,12 @@ struct Watched {
       const Index body = part_of(model, i).body;
       return SurfaceState{way[body], velocity[body]};
     };
-    if (!watch.is_late(dt, skin, state_of)) return false;
+    if (!watch.is_late(dt, state_of)) return false;
     std::vector<Vec3d> position;
     for (const Index i : model.body_contact.layer.phyxels) {
       position.push_back(model.position[i] + state_of(i).displacement);
     }
-    watch.found(position, layer.reach_at(position));
+    watch.found(position, layer.reach_at(position, watch.skin()));
     return true;
   }
 };
@@ -173,13 +172,13 @@ TEST(LayerWatch, LooksAtBodiesThatMoveAgainstEachOtherAlone) {
   EXPECT_TRUE(bodies.is_late());
   EXPECT_FALSE(bodies.is_late());
   // Two that are near each other move by less than a skin, and by more.
-  bodies.way[0].y = 0.9 * bodies.skin;
+  bodies.way[0].y = 0.9 * bodies.watch.skin();
   EXPECT_FALSE(bodies.is_late());
-  bodies.way[1].z -= 0.9 * bodies.skin;
+  bodies.way[1].z -= 0.9 * bodies.watch.skin();
   EXPECT_TRUE(bodies.is_late());
   // One is so fast that it will.
   EXPECT_FALSE(bodies.is_late());
-  bodies.velocity[0].y = 0.6 * bodies.skin / dt;
+  bodies.velocity[0].y = 0.6 * bodies.watch.skin() / dt;
   EXPECT_TRUE(bodies.is_late());
 }
 
@@ -187,8 +186,8 @@ TEST(LayerWatch, LooksAnewWhereTheStepChanges) {
   Watched bodies({{}, {0.25, 0, 0}});
   EXPECT_TRUE(bodies.is_late());
   const auto at_rest = [](Index) { return SurfaceState{}; };
-  EXPECT_FALSE(bodies.watch.is_late(dt, bodies.skin, at_rest));
-  EXPECT_TRUE(bodies.watch.is_late(dt / 2, bodies.skin, at_rest));
+  EXPECT_FALSE(bodies.watch.is_late(dt, at_rest));
+  EXPECT_TRUE(bodies.watch.is_late(dt / 2, at_rest));
 }
 
 /// Obstacles of all shapes, at random places, turned, some of them hollow or on their way.

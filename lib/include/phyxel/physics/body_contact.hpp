@@ -121,6 +121,8 @@ struct OneThread {
   }
   /// The nearest of what the threads have found; of equal ones, the first in the list.
   PHYXEL_HD NearestPhyxel nearest(const NearestPhyxel& own) const { return own; }
+  /// The least of what the threads have.
+  PHYXEL_HD double least(double own) const { return own; }
   /// True of the thread that writes what all have found.
   PHYXEL_HD bool is_first() const { return true; }
 };
@@ -142,6 +144,7 @@ PHYXEL_HD double carrying_weight(Vec3<double> normal, double square, double rang
 /// A point that is inside a body at the end of a step.
 struct SurfaceTouch {
   bool is_inside = false;
+  bool is_alone = false;        ///< True if no phyxel of the surface within range faces it.
   double gap = 0;               ///< g - offset [m].
   Vec3<double> normal;          ///< n̄, away from the body.
   Vec3<double> centre;          ///< Mean place of those that carry it, as the step starts [m].
@@ -299,7 +302,7 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
 /// @param least distance at rest between a point and a part of its own body that it may touch
 /// [m]; 0 for other bodies
 /// @param reach gap below which the point counts as inside, as a share of its range
-/// @param shares receive those of the entries; all zero if the point is outside
+/// @param shares zero; receive those of the entries if the point is inside
 template <class Threads, class SiteOf, class MotionOf>
 PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& site,
                                      const SurfaceMotion& point, const Offset* list,
@@ -307,8 +310,8 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
                                      const PlacedDistances& field, double least, double reach,
                                      SurfaceShare* shares) {
   SurfaceTouch touch;
-  threads.each(list, [&](Offset k) { shares[k] = {}; });
   const PlaceAtRest rest = place_at_rest(threads, site, point, list, site_of, motion_of, field);
+  touch.is_alone = !(rest.weights > 0);
   if (!(rest.weights > least_weight)) return touch;
   const auto square_of = [&](Offset k) {
     const Vec3<double> apart = motion_of(k).after - point.after;
