@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "bench_body.hpp"
+#include "bench_error.hpp"
 #include "bench_sample.hpp"
 #include "bench_scaling.hpp"
 #include "cantilever.hpp"
@@ -360,12 +361,14 @@ void add_bench(CLI::App& program) {
   bench->require_subcommand(1);
   add_bench_step(*bench);
   add_bench_cantilever(*bench);
+  add_bench_error(*bench);
   add_bench_scaling(*bench);
   add_bench_sample(*bench);
   bench->footer(
       "Examples:\n"
       "  phyxel bench step\n"
       "  phyxel bench cantilever --across 4,8\n"
+      "  phyxel bench error gravity\n"
       "  mpirun -n 2 phyxel bench scaling\n"
       "  phyxel bench sample bunny.obj\n"
       "More: phyxel bench step --help");

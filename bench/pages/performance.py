@@ -2,7 +2,7 @@
 All measured numbers come from these tables; the targets are constants here."""
 import math
 
-from pages import cantilever, large_meshes
+from pages import cantilever, error, large_meshes
 from pages.charts import LineChart
 from pages.page import Page, measured_by
 from pages.tables import markdown_table, read_if_there
@@ -239,7 +239,7 @@ def bin_of_dinos(page, table, _):
         f"at most; friction took {row.number('friction_heat_j'):.3g} J, and impacts {'took' if loss > 0 else 'made'} {abs(loss):.3g} J.")
 
 
-SECTIONS = {"gpu_sizes": sizes, "gpu_small": small, "gpu_surfels": surfels, "gpu_neighbours": neighbours,
+SECTIONS = {"gpu_error": lambda page, table, results: error.add(page, table, results, "gpu_error"), "gpu_sizes": sizes, "gpu_small": small, "gpu_surfels": surfels, "gpu_neighbours": neighbours,
             "gpu_cantilever": bending, "gpu_terms": terms, "gpu_setup": setup, "gpu_profile": profile,
             "gpu_bin": bin_of_dinos}
 

@@ -182,7 +182,7 @@ TEST(TouchingPointsOfDistantBodies, AreNone) {
   DeviceTouchingPoints device(layer, std::vector<Index>(layer.phyxels().size()), 1);
   std::vector<Vec3d> position;
   for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
-  device.find(sent(position), 1e-4);
+  device.find(sent(position), 1e-4, layer.most_skin());
   EXPECT_FALSE(device.any());
   EXPECT_EQ(device.own().layer.size(), 0u);
   EXPECT_EQ(device.lists().rows.size(), 0u);

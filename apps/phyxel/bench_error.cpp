@@ -1,0 +1,381 @@
+#include "bench_error.hpp"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <omp.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <tuple>
+
+#include "accuracy/accuracy.hpp"
+#include "accuracy/bar.hpp"
+#include "device_option.hpp"
+#include "fastest.hpp"
+#include "phyxel/phyxel.hpp"
+#include "printed_table.hpp"
+#include "setup.hpp"
+#include "stopwatch.hpp"
+
+namespace phyxel::app {
+namespace {
+
+struct ErrorOptions {
+  std::vector<std::string> problems{"gravity", "shear", "tension", "twist"};
+  std::vector<int> across{4, 6, 8, 12, 16};
+  std::vector<std::string> lattices{"nodes", "mesh"};
+  std::vector<double> factors{1.5, 1.6, 1.7, 1.8, 2.0};
+  std::vector<double> hourglass{0.1};
+  std::vector<double> closures;  ///< Empty: 0 for lattices, 0.001 for meshes.
+  std::vector<double> safeties{0.8};
+  std::vector<double> levels{1, 0.3, 0.1};  ///< [%]
+  std::vector<std::string> precisions{"float"};
+  std::string device = "cpu", fastest;
+  double seconds = 0.2;
+  TableOptions table;
+};
+
+/// What all resolutions of a family have in common.
+struct Setting {
+  Filling filling;
+  double factor, hourglass, closure;
+  Discretisation at(int across) const {
+    return {.filling = filling,
+            .factor = factor,
+            .hourglass = hourglass,
+            .closure = closure,
+            .across = across};
+  }
+  std::vector<std::string> cells() const {
+    return {filling_name(filling), fmt::format("{:g}", factor), fmt::format("{:g}", hourglass),
+            fmt::format("{:g}", closure)};
+  }
+};
+
+std::vector<Setting> settings_of(const ErrorOptions& options) {
+  std::vector<Setting> all;
+  for (const Filling filling : {Filling::nodes, Filling::cells, Filling::mesh}) {
+    if (std::find(options.lattices.begin(), options.lattices.end(), filling_name(filling)) ==
+        options.lattices.end()) {
+      continue;
+    }
+    const std::vector<double> own{filling == Filling::mesh ? 1e-3 : 0.0};
+    for (const double closure : options.closures.empty() ? own : options.closures) {
+      for (const double factor : options.factors) {
+        for (const double hourglass : options.hourglass) {
+          all.push_back({filling, factor, hourglass, closure});
+        }
+      }
+    }
+  }
+  return all;
+}
+
+/// The steps of the bar in one discretisation and precision.
+struct StepTime {
+  double step = 0;     ///< Largest stable step [s].
+  double seconds = 0;  ///< Of a step, on the device.
+};
+
+/// Measures them for some time [s].
+StepTime time_of_steps(const Discretisation& d, const ErrorOptions& options,
+                       const ChosenDevice& device, const std::string& precision) {
+  Scene scene = clamped(bar(d, 1, 0.2));
+  scene.gravity = {0, 0, -0.1};
+  const Cloud cloud = cloud_of(scene, d);
+  const Model model = build_model(scene, std::span(&cloud, 1), device);
+  const auto backend =
+      make_backend(model, precision_option(precision), device, omp_get_max_threads());
+  StepTime found{.step = step_limit(model, *backend).largest_step};
+  Solver solver(*backend, initial_state(model, scene, options.safeties.front() * found.step));
+  solver.step(64);
+  backend->wait();
+  std::int64_t steps = 0;
+  const auto start = Clock::now();
+  while (seconds_since(start) < options.seconds) {
+    solver.step(256);
+    steps += 256;
+    backend->wait();
+  }
+  found.seconds = seconds_since(start) / static_cast<double>(steps);
+  return found;
+}
+
+/// Errors and times of one family and quantity: at rest on the CPU, and in steps.
+struct Family {
+  std::string problem, quantity;
+  std::vector<Measured> rest;
+  std::map<std::pair<std::string, double>, std::vector<Measured>> swing;  ///< Precision, safety.
+};
+
+std::vector<AccuracyCase> problems_of(const ErrorOptions& options) {
+  std::vector<AccuracyCase> chosen;
+  std::vector<std::string> known;
+  for (const AccuracyCase& c : static_cases()) {
+    if (c.name != "patch" && c.name != "rotation") known.push_back(c.name);
+  }
+  for (const std::string& name : options.problems) {
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      throw InputError(fmt::format("problem {}: unknown{}; allowed: {}", name,
+                                   did_you_mean(name, known), fmt::join(known, ", ")));
+    }
+  }
+  for (const AccuracyCase& c : static_cases()) {
+    if (std::find(options.problems.begin(), options.problems.end(), c.name) !=
+        options.problems.end()) {
+      chosen.push_back(c);
+    }
+  }
+  return chosen;
+}
+
+/// True of problems on the bar whose steps are timed.
+bool is_on_bar(const std::string& problem) {
+  return problem == "gravity" || problem == "shear" || problem == "tension" || problem == "twist";
+}
+
+/// Measures one family, resolution by resolution.
+class FamilyRun {
+ public:
+  FamilyRun(const ErrorOptions& options, const ChosenDevice& device, const Setting& setting,
+            PrintedTable& table)
+      : options_(options), device_(device), setting_(setting), table_(table) {}
+
+  std::vector<Family> measure(const std::vector<AccuracyCase>& problems) {
+    for (const int across : options_.across) {
+      try {
+        measure(problems, across);
+      } catch (const InputError& error) {
+        fmt::print(stderr, "phyxel: {} is left out, {} across, factor {:g}: {}\n",
+                   filling_name(setting_.filling), across, setting_.factor, error.what());
+      }
+    }
+    return std::move(families_);
+  }
+
+ private:
+  void measure(const std::vector<AccuracyCase>& problems, int across) {
+    const Discretisation d = setting_.at(across);
+    std::map<std::string, StepTime> times;
+    const bool steps = std::any_of(problems.begin(), problems.end(),
+                                   [](const AccuracyCase& c) { return is_on_bar(c.name); });
+    for (const std::string& precision : options_.precisions) {
+      if (steps) times[precision] = time_of_steps(d, options_, device_, precision);
+    }
+    for (const AccuracyCase& problem : problems) {
+      const Solution solution = problem.solve(d);
+      for (const Quantity& found : solution.found) {
+        Family& family = family_of(problem.name, found.name);
+        family.rest.push_back({across, found.error(), solution.seconds});
+        std::vector<std::string> common{problem.name, found.name};
+        for (const std::string& cell : setting_.cells()) common.push_back(cell);
+        for (const std::string& cell :
+             {std::to_string(across), std::to_string(solution.phyxels),
+              fmt::format("{:.1f}", solution.neighbours), fmt::format("{:.4e}", found.error()),
+              std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds)}) {
+          common.push_back(cell);
+        }
+        if (!is_on_bar(problem.name)) {
+          common.resize(common.size() + 5);
+          table_.row(common);
+        }
+        for (const auto& [precision, time] : times) {
+          if (is_on_bar(problem.name)) add_steps(family, across, found, common, precision, time);
+        }
+      }
+    }
+  }
+  void add_steps(Family& family, int across, const Quantity& found,
+                 const std::vector<std::string>& common, const std::string& precision,
+                 const StepTime& time) {
+    for (const double safety : options_.safeties) {
+      const double step = safety * time.step, swing = time.seconds / step;
+      family.swing[{precision, safety}].push_back({across, found.error(), swing});
+      std::vector<std::string> row = common;
+      for (const std::string& cell :
+           {precision, fmt::format("{:g}", safety), fmt::format("{:.4g}", step),
+            fmt::format("{:.4g}", time.seconds), fmt::format("{:.4g}", swing)}) {
+        row.push_back(cell);
+      }
+      table_.row(row);
+    }
+  }
+  Family& family_of(const std::string& problem, const std::string& quantity) {
+    const auto found = std::find_if(families_.begin(), families_.end(), [&](const Family& f) {
+      return f.problem == problem && f.quantity == quantity;
+    });
+    if (found != families_.end()) return *found;
+    return families_.emplace_back(Family{problem, quantity, {}, {}});
+  }
+
+  const ErrorOptions& options_;
+  const ChosenDevice& device_;
+  const Setting& setting_;
+  PrintedTable& table_;
+  std::vector<Family> families_;
+};
+
+/// The fastest setting for each problem, kind of cloud, kind of run and level.
+class Fastest {
+ public:
+  explicit Fastest(const std::vector<double>& levels) : levels_(levels) {}
+
+  void add(const Setting& setting, const Family& family) {
+    look(setting, family, "rest", {}, family.rest);
+    for (const auto& [how, swing] : family.swing) look(setting, family, "steps", how, swing);
+  }
+  /// The worst of some families, which have the same resolutions.
+  void add_worst(const Setting& setting, const std::vector<Family>& families) {
+    if (families.size() < 2) return;
+    Family worst = families.front();
+    worst.problem = "all";
+    worst.quantity = "worst";
+    const auto take = [](std::vector<Measured>& all, const std::vector<Measured>& more,
+                         bool add_times) {
+      for (std::size_t k = 0; k < std::min(all.size(), more.size()); ++k) {
+        all[k].error = std::max(std::abs(all[k].error), std::abs(more[k].error));
+        if (add_times) all[k].seconds = std::max(all[k].seconds, more[k].seconds);
+      }
+    };
+    for (const Family& family : families) {
+      take(worst.rest, family.rest, true);
+      for (auto& [how, swing] : worst.swing) {
+        const auto found = family.swing.find(how);
+        if (found != family.swing.end()) take(swing, found->second, false);
+      }
+    }
+    add(setting, worst);
+  }
+  void print(PrintedTable& table) const {
+    for (const auto& [key, best] : best_) {
+      const auto& [problem, quantity, filling, run, level] = key;
+      std::vector<std::string> row{problem, quantity, filling, run, fmt::format("{:g}", -level)};
+      const std::vector<std::string> cells = best.setting.cells();
+      row.insert(row.end(), cells.begin() + 1, cells.end());
+      for (const std::string& cell :
+           {best.precision, best.safety > 0 ? fmt::format("{:g}", best.safety) : "",
+            fmt::format("{:.3g}", best.at.across), fmt::format("{:.4g}", best.at.seconds)}) {
+        row.push_back(cell);
+      }
+      table.row(row);
+    }
+  }
+
+ private:
+  struct Best {
+    Setting setting;
+    std::string precision;
+    double safety = 0;
+    Reached at;
+  };
+  void look(const Setting& setting, const Family& family, const char* run,
+            const std::pair<std::string, double>& how, const std::vector<Measured>& measured) {
+    for (const double level : levels_) {
+      const std::optional<Reached> at = reach(measured, level / 100);
+      if (!at) continue;
+      const Best found{setting, how.first, how.second, *at};
+      const auto [best, is_new] = best_.try_emplace(
+          {family.problem, family.quantity, filling_name(setting.filling), run, -level}, found);
+      if (!is_new && at->seconds < best->second.at.seconds) best->second = found;
+    }
+  }
+
+  std::vector<double> levels_;
+  std::map<std::tuple<std::string, std::string, std::string, std::string, double>, Best> best_;
+};
+
+void bench_error(const ErrorOptions& options) {
+  const ChosenDevice device = choose_device(options.device);
+  const std::vector<AccuracyCase> problems = problems_of(options);
+  Fastest fastest(options.levels);
+  TableOptions summary{options.fastest, options.table.force, options.table.json};
+  {
+    PrintedTable table(
+        options.table,
+        {"problem", "quantity", "lattice", "factor", "hourglass", "closure", "across", "phyxels",
+         "neighbours", "error", "evaluations", "rest_seconds", "precision", "safety", "time_step_s",
+         "step_seconds", "seconds_per_simulated_second"},
+        device_facts(device));
+    for (const Setting& setting : settings_of(options)) {
+      const std::vector<Family> families =
+          FamilyRun(options, device, setting, table).measure(problems);
+      for (const Family& family : families) fastest.add(setting, family);
+      fastest.add_worst(setting, families);
+    }
+  }
+  if (options.table.json && options.fastest.empty()) return;  // one object on stdout
+  summary.json = false;
+  PrintedTable table(summary,
+                     {"problem", "quantity", "lattice", "run", "error_percent", "factor",
+                      "hourglass", "closure", "precision", "safety", "across", "seconds"},
+                     device_facts(device));
+  fastest.print(table);
+}
+
+template <class T, class Check>
+void add_list(CLI::App& command, const char* name, std::vector<T>& values, const char* what,
+              Check&& check) {
+  command.add_option(name, values, what)->delimiter(',')->check(check)->capture_default_str();
+}
+
+}  // namespace
+
+void add_bench_error(CLI::App& bench) {
+  CLI::App* command = bench.add_subcommand(
+      "error",
+      "Measure the time that it takes to reach an error, over spacings, supports and the rest, and "
+      "find the fastest settings");
+  auto options = std::make_shared<ErrorOptions>();
+  command
+      ->add_option("problems", options->problems,
+                   "Problems of `phyxel accuracy` at rest. Of those on its bar (gravity, shear, "
+                   "tension, twist) steps are timed, too: the seconds that one simulated second "
+                   "takes, in which the bar swings once")
+      ->capture_default_str();
+  add_list(*command, "--across", options->across, "Numbers of cells across the thinner sides",
+           CLI::Range(2, 200));
+  add_list(*command, "--lattice", options->lattices,
+           "Placements of phyxels: nodes, cells, or mesh (on and in a surface)",
+           CLI::IsMember({"nodes", "cells", "mesh"}));
+  add_list(*command, "--factor", options->factors,
+           "Support radii, in mean distances to the ten nearest phyxels", CLI::Range(1.0, 4.0));
+  add_list(*command, "--hourglass", options->hourglass, "Strengths of hourglass control",
+           CLI::Range(0.0, 100.0));
+  command
+      ->add_option("--closure", options->closures,
+                   "Tolerances of closed gradients; 0 for none (default: 0 for lattices, 0.001 for "
+                   "meshes)")
+      ->delimiter(',')
+      ->check(CLI::Range(0.0, 1.0));
+  add_list(*command, "--safety", options->safeties, "Steps over the largest stable one",
+           CLI::Range(0.01, 1.0));
+  add_list(*command, "--level", options->levels, "Errors to reach [%]", CLI::Range(1e-6, 100.0));
+  add_list(*command, "--precision", options->precisions,
+           "Precisions of steps: float, double, mixed",
+           CLI::IsMember({"float", "double", "mixed"}));
+  command->add_option("--device", options->device, device_help)->capture_default_str();
+  command->add_option("--seconds", options->seconds, "Least time of each measurement of steps [s]")
+      ->check(CLI::Range(0.001, 100.0))
+      ->capture_default_str();
+  command->add_option("--fastest", options->fastest,
+                      "Also write the table of the fastest settings to this file");
+  add_table_options(*command, options->table);
+  command->footer(
+      "The first table has the errors and times of all settings; the second one, for each error, "
+      "the fastest setting of each problem and of the worst of all problems. An error counts as "
+      "reached where all finer clouds are as good, too: at one spacing it may be small by chance, "
+      "as where it changes its sign.\n"
+      "Examples:\n"
+      "  phyxel bench error\n"
+      "  phyxel bench error gravity --lattice nodes --factor 1.6,1.8 --device cuda --csv "
+      "error.csv");
+  command->callback([options] {
+    std::sort(options->across.begin(), options->across.end());
+    bench_error(*options);
+  });
+}
+
+}  // namespace phyxel::app

@@ -1,0 +1,31 @@
+/// The time that a family of discretisations needs to reach an error.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace phyxel::app {
+
+/// A discretisation of a family, which differ in resolution alone.
+struct Measured {
+  int across = 0;      ///< Cells across the thinner sides.
+  double error = 0;    ///< Relative to the known answer, with its sign.
+  double seconds = 0;  ///< Time that it takes.
+};
+
+/// The largest error of each resolution and of all finer ones: an error that is small because it
+/// changes its sign there does not count. @param family ascending resolutions
+std::vector<double> lasting_errors(std::span<const Measured> family);
+
+/// A place on the way from one resolution to the next.
+struct Reached {
+  double across = 0, seconds = 0;
+};
+
+/// Where the lasting errors of a family come down to a level: between two resolutions time and
+/// resolution are taken as powers of the error. None if they do not, or only at the finest
+/// resolution, beyond which nothing tells whether the error lasts.
+std::optional<Reached> reach(std::span<const Measured> family, double level);
+
+}  // namespace phyxel::app
