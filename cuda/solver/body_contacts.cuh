@@ -214,18 +214,22 @@ class DeviceBodyContacts {
   void look(double dt) {
     const Phase phase("looking where bodies are");
     const int count = static_cast<int>(layer_place_.size());
+    const auto find_places = [&] {
+      m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
+                     layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
+    };
+    if (watch_.generation() == 0) find_places();
     if (!watch_.is_late_by(ways_now(), dt)) return;
-    m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
-                   layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
+    find_places();
     m_.wait();
     points_.find(layer_found_, dt, watch_.skin());
     watch_.found(points_.reach());
     make_arrays(dt);
   }
-  /// The ways of the groups of the layer since points were found; none before that.
+  /// The ways of the groups of the layer since places were found.
   std::vector<SurfaceWay> ways_now() {
     std::vector<SurfaceWay> ways(layer_.groups().size());
-    if (watch_.generation() == 0 || ways.empty()) return ways;
+    if (ways.empty()) return ways;
     const auto blocks = static_cast<unsigned>(ways.size());
     find_ways<<<blocks, tile_size, 0, m_.stream()>>>(
         m_.fields(), layer_place_.data(), layer_position_.data(), layer_found_.data(),

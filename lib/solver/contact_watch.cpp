@@ -45,7 +45,8 @@ void LayerWatch::set_skin(double speed, double dt) {
   const int steps = 4 * watch_.rarest() + 8;  // some looks, and some steps more
   // On the host, longer lists cost more than rarer searches save.
   const double widest = (watch_.rarest() > 1 ? 1 : 0.5) * layer_.most_skin();
-  skin_ = std::clamp(speeds_may_grow * speed * steps * dt, layer_.least_skin(), widest);
+  const double way = speeds_may_grow * speed * dt;  // in a step
+  skin_ = std::max(std::clamp(way * steps, layer_.least_skin(), widest), way);
 }
 
 // Phyxels move by half a skin each. Speeds may grow until the next look.
@@ -70,17 +71,19 @@ bool LayerWatch::is_late_on_ranks(double dt) {
 }
 
 bool LayerWatch::is_late_here(double dt) {
-  const bool is_late = !watch_.has_found(dt) || have_come_near(dt);
-  if (is_late) {
-    watch_.renew(dt);
-    set_skin(fastest_meeting(), dt);
+  if (watch_.has_found(dt) && !have_come_near(dt)) {
+    watch_.put_off();
+    return false;
   }
-  watch_.put_off();
-  return is_late;
+  const double fastest = fastest_meeting(dt);
+  watch_.renew(dt);
+  set_skin(fastest, dt);
+  watch_.put_off(skin_ / std::max(speeds_may_grow * fastest * dt, 1e-300));
+  return true;
 }
 
 std::vector<Box> LayerWatch::of_bodies(Box SurfaceWay::*of_group) const {
-  std::vector<Box> all(reach_.boxes.size(), no_box);
+  std::vector<Box> all(layer_.model().body_contact.distances.size(), no_box);
   for (std::size_t g = 0; g < ways_.size(); ++g) {
     const Box& box = ways_[g].*of_group;
     Box& of_body = all[layer_.bodies()[layer_.groups()[g].begin]];
@@ -90,13 +93,23 @@ std::vector<Box> LayerWatch::of_bodies(Box SurfaceWay::*of_group) const {
   return all;
 }
 
-double LayerWatch::fastest_meeting() const {
-  if (reach_.boxes.empty()) return 0;  // points have not been found yet
+double LayerWatch::fastest_meeting(double dt) const {
   const std::vector<Box> speeds = of_bodies(&SurfaceWay::speeds),
                          moved = of_bodies(&SurfaceWay::moved);
+  if (watch_.generation() == 0) {  // it is not known which bodies are near each other
+    Box all = no_box;
+    for (const Box& some : speeds) {
+      if (!is_filled(some)) continue;
+      extend(all, some.low);
+      extend(all, some.high);
+    }
+    return is_filled(all) ? largest_difference(all, all) : 0;
+  }
+  const double span = speeds_may_grow * watch_.rarest() * dt;
   std::vector<Box> boxes = reach_.boxes;
   for (std::size_t b = 0; b < boxes.size(); ++b) {
-    if (is_filled(boxes[b])) boxes[b] = grown(sum_of(boxes[b], moved[b]), 0.5 * layer_.most_skin());
+    if (!is_filled(boxes[b])) continue;
+    boxes[b] = grown(sum_of(sum_of(boxes[b], moved[b]), speeds[b], span), 0.5 * layer_.most_skin());
   }
   double fastest = 0;
   const auto look_at = [&](std::size_t a, std::size_t b) {

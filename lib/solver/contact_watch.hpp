@@ -68,7 +68,7 @@ class LayerWatch {
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return watch_.is_due(dt); }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
-  /// @param ways of the groups since points were found; not looked at before that
+  /// @param ways of the groups since points were found, zero before that
   bool is_late_by(std::vector<SurfaceWay> ways, double dt) {
     ways_ = std::move(ways);
     return layer_.model().share ? is_late_on_ranks(dt) : is_late_here(dt);
@@ -77,24 +77,24 @@ class LayerWatch {
   /// @param state_of returns the state of a phyxel
   template <class StateOf>
   bool is_late(double dt, StateOf&& state_of) {
-    if (!found_at_.empty()) {
+    const bool have_been_found = !found_at_.empty();
 #pragma omp parallel for schedule(static) num_threads(threads_)
-      for (std::size_t g = 0; g < ways_.size(); ++g) {
-        SurfaceWay way;
-        for (std::size_t k = layer_.groups()[g].begin; k < layer_.groups()[g].end; ++k) {
-          const Index i = layer_.phyxels()[k];
-          const SurfaceState state = state_of(i);
-          extend(way.moved, layer_.model().position[i] + state.displacement - found_at_[k]);
-          extend(way.speeds, state.velocity);
-        }
-        ways_[g] = way;
+    for (std::size_t g = 0; g < ways_.size(); ++g) {
+      SurfaceWay way;
+      for (std::size_t k = layer_.groups()[g].begin; k < layer_.groups()[g].end; ++k) {
+        const Index i = layer_.phyxels()[k];
+        const SurfaceState state = state_of(i);
+        const Vec3d now = layer_.model().position[i] + state.displacement;
+        extend(way.moved, have_been_found ? now - found_at_[k] : Vec3d{});
+        extend(way.speeds, state.velocity);
       }
+      ways_[g] = way;
     }
     return is_late_by(std::move(ways_), dt);
   }
   /// The skin of the lists that are to be found [m], once `is_late` has asked for them: it lasts
-  /// for some tens of steps, within the bounds of the layer. Fast bodies need a wide one; a wide
-  /// one costs time in each step.
+  /// for some tens of steps, within the bounds of the layer, and for one at least. Fast bodies need
+  /// a wide one; a wide one costs time in each step.
   double skin() const { return skin_; }
   /// Notes where bodies are when points are found.
   void found(const BodyReach& reach) { reach_ = reach; }
@@ -115,7 +115,7 @@ class LayerWatch {
   /// True if bodies may touch in the next step at places that are not among the points.
   bool have_come_near(double dt) const;
   /// The largest speed of bodies against each other that may soon be near each other [m/s].
-  double fastest_meeting() const;
+  double fastest_meeting(double dt) const;
   /// Sets the skin for bodies that move against each other at a speed [m/s].
   void set_skin(double speed, double dt);
 

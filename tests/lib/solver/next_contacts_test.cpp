@@ -114,6 +114,30 @@ TEST_P(NextContacts, AreThoseThatTheHostFinds) {
   EXPECT_GT(deepest, 1e-6);
 }
 
+TEST(FastBodies, AreSeenByReadingsAndBySteps) {
+  // Two slabs slide over each other, by 0.44 of a support in a step.
+  constexpr double step = 0.00125;
+  const auto slab = [](const char* name, const char* at, const char* velocity) {
+    return body(name,
+                fmt::format("shape = 'block'\nsize = [0.6, 0.3, 0.15]\nspacing = 0.05\n"
+                            "translation = [{}]\nvelocity = [{}]\n",
+                            at, velocity),
+                "", 1e6);
+  };
+  Way way(end + "[contact]\n" + slab("a", "-0.2, 0, 0.0753", "19, 0, -0.5") +
+              slab("b", "0.2, 0.01, -0.0753", "-19, 0, 0.5"),
+          step);
+  int touching = 0;
+  for (int k = 0; k < 16; ++k) {
+    const ContactReading now = way.contacts()[0];
+    way.solver.step();
+    const Vec3d did = way.contacts()[0].impulse - now.impulse;
+    EXPECT_LE(norm(did - step * now.force), 1e-9 * norm(did)) << k;
+    touching += norm(did) > 0;
+  }
+  EXPECT_GT(touching, 10);
+}
+
 INSTANTIATE_TEST_SUITE_P(
     All, NextContacts,
     ::testing::Values(Kind{"impulses", "friction = 0.3\nsweeps = 3\n", "friction = 0.2\n",
