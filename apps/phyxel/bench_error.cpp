@@ -6,10 +6,9 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
-#include <tuple>
 
 #include "accuracy/accuracy.hpp"
 #include "accuracy/bar.hpp"
@@ -33,7 +32,7 @@ struct ErrorOptions {
   std::vector<double> safeties{0.8};
   std::vector<double> levels{1, 0.3, 0.1};  ///< [%]
   std::vector<std::string> precisions{"float"};
-  std::string device = "cpu", fastest;
+  std::string device = "cpu", fastest, from;
   double seconds = 0.2;
   TableOptions table;
 };
@@ -104,13 +103,6 @@ StepTime time_of_steps(const Discretisation& d, const ErrorOptions& options,
   return found;
 }
 
-/// Errors and times of one family and quantity: at rest on the CPU, and in steps.
-struct Family {
-  std::string problem, quantity;
-  std::vector<Measured> rest;
-  std::map<std::pair<std::string, double>, std::vector<Measured>> swing;  ///< Precision, safety.
-};
-
 std::vector<AccuracyCase> problems_of(const ErrorOptions& options) {
   std::vector<AccuracyCase> chosen;
   std::vector<std::string> known;
@@ -132,187 +124,92 @@ std::vector<AccuracyCase> problems_of(const ErrorOptions& options) {
   return chosen;
 }
 
+/// Receives rows of `error_columns`.
+using RowSink = std::function<void(const std::vector<std::string>&)>;
+
 /// True of problems on the bar whose steps are timed.
 bool is_on_bar(const std::string& problem) {
   return problem == "gravity" || problem == "shear" || problem == "tension" || problem == "twist";
 }
 
-/// Measures one family, resolution by resolution.
-class FamilyRun {
- public:
-  FamilyRun(const ErrorOptions& options, const ChosenDevice& device, const Setting& setting,
-            PrintedTable& table)
-      : options_(options), device_(device), setting_(setting), table_(table) {}
-
-  std::vector<Family> measure(const std::vector<AccuracyCase>& problems) {
-    for (const int across : options_.across) {
-      try {
-        measure(problems, across);
-      } catch (const InputError& error) {
-        fmt::print(stderr, "phyxel: {} is left out, {} across, factor {:g}: {}\n",
-                   filling_name(setting_.filling), across, setting_.factor, error.what());
-      }
-    }
-    return std::move(families_);
+/// Measures one setting at one resolution.
+void measure(const ErrorOptions& options, const ChosenDevice& device, const Setting& setting,
+             int across, const std::vector<AccuracyCase>& problems, const RowSink& add_row) {
+  const Discretisation d = setting.at(across);
+  std::map<std::string, StepTime> times;
+  const bool steps = std::any_of(problems.begin(), problems.end(),
+                                 [](const AccuracyCase& c) { return is_on_bar(c.name); });
+  for (const std::string& precision : options.precisions) {
+    if (steps) times[precision] = time_of_steps(d, options, device, precision);
   }
-
- private:
-  void measure(const std::vector<AccuracyCase>& problems, int across) {
-    const Discretisation d = setting_.at(across);
-    std::map<std::string, StepTime> times;
-    const bool steps = std::any_of(problems.begin(), problems.end(),
-                                   [](const AccuracyCase& c) { return is_on_bar(c.name); });
-    for (const std::string& precision : options_.precisions) {
-      if (steps) times[precision] = time_of_steps(d, options_, device_, precision);
-    }
-    for (const AccuracyCase& problem : problems) {
-      const Solution solution = problem.solve(d);
-      for (const Quantity& found : solution.found) {
-        Family& family = family_of(problem.name, found.name);
-        family.rest.push_back({across, found.error(), solution.seconds});
-        std::vector<std::string> common{problem.name, found.name};
-        for (const std::string& cell : setting_.cells()) common.push_back(cell);
-        for (const std::string& cell :
-             {std::to_string(across), std::to_string(solution.phyxels),
-              fmt::format("{:.1f}", solution.neighbours), fmt::format("{:.4e}", found.error()),
-              std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds)}) {
-          common.push_back(cell);
-        }
-        if (!is_on_bar(problem.name)) {
-          common.resize(common.size() + 5);
-          table_.row(common);
-        }
-        for (const auto& [precision, time] : times) {
-          if (is_on_bar(problem.name)) add_steps(family, across, found, common, precision, time);
+  for (const AccuracyCase& problem : problems) {
+    const Solution solution = problem.solve(d);
+    for (const Quantity& found : solution.found) {
+      std::vector<std::string> common{problem.name, found.name};
+      const std::vector<std::string> of_setting = setting.cells();
+      common.insert(common.end(), of_setting.begin(), of_setting.end());
+      common.insert(
+          common.end(),
+          {std::to_string(across), std::to_string(solution.phyxels),
+           fmt::format("{:.1f}", solution.neighbours), fmt::format("{:.4e}", found.error()),
+           std::to_string(solution.evaluations), fmt::format("{:.4g}", solution.seconds)});
+      if (!is_on_bar(problem.name)) {
+        common.resize(error_columns().size());
+        add_row(common);
+        continue;
+      }
+      for (const auto& [precision, time] : times) {
+        for (const double safety : options.safeties) {
+          const double step = safety * time.step;
+          std::vector<std::string> row = common;
+          row.insert(row.end(), {precision, fmt::format("{:g}", safety),
+                                 fmt::format("{:.4g}", step), fmt::format("{:.4g}", time.seconds),
+                                 fmt::format("{:.4g}", time.seconds / step)});
+          add_row(row);
         }
       }
     }
   }
-  void add_steps(Family& family, int across, const Quantity& found,
-                 const std::vector<std::string>& common, const std::string& precision,
-                 const StepTime& time) {
-    for (const double safety : options_.safeties) {
-      const double step = safety * time.step, swing = time.seconds / step;
-      family.swing[{precision, safety}].push_back({across, found.error(), swing});
-      std::vector<std::string> row = common;
-      for (const std::string& cell :
-           {precision, fmt::format("{:g}", safety), fmt::format("{:.4g}", step),
-            fmt::format("{:.4g}", time.seconds), fmt::format("{:.4g}", swing)}) {
-        row.push_back(cell);
-      }
-      table_.row(row);
-    }
-  }
-  Family& family_of(const std::string& problem, const std::string& quantity) {
-    const auto found = std::find_if(families_.begin(), families_.end(), [&](const Family& f) {
-      return f.problem == problem && f.quantity == quantity;
-    });
-    if (found != families_.end()) return *found;
-    return families_.emplace_back(Family{problem, quantity, {}, {}});
-  }
+}
 
-  const ErrorOptions& options_;
-  const ChosenDevice& device_;
-  const Setting& setting_;
-  PrintedTable& table_;
-  std::vector<Family> families_;
-};
-
-/// The fastest setting for each problem, kind of cloud, kind of run and level.
-class Fastest {
- public:
-  explicit Fastest(const std::vector<double>& levels) : levels_(levels) {}
-
-  void add(const Setting& setting, const Family& family) {
-    look(setting, family, "rest", {}, family.rest);
-    for (const auto& [how, swing] : family.swing) look(setting, family, "steps", how, swing);
-  }
-  /// The worst of some families, which have the same resolutions.
-  void add_worst(const Setting& setting, const std::vector<Family>& families) {
-    if (families.size() < 2) return;
-    Family worst = families.front();
-    worst.problem = "all";
-    worst.quantity = "worst";
-    const auto take = [](std::vector<Measured>& all, const std::vector<Measured>& more,
-                         bool add_times) {
-      for (std::size_t k = 0; k < std::min(all.size(), more.size()); ++k) {
-        all[k].error = std::max(std::abs(all[k].error), std::abs(more[k].error));
-        if (add_times) all[k].seconds = std::max(all[k].seconds, more[k].seconds);
-      }
-    };
-    for (const Family& family : families) {
-      take(worst.rest, family.rest, true);
-      for (auto& [how, swing] : worst.swing) {
-        const auto found = family.swing.find(how);
-        if (found != family.swing.end()) take(swing, found->second, false);
-      }
-    }
-    add(setting, worst);
-  }
-  void print(PrintedTable& table) const {
-    for (const auto& [key, best] : best_) {
-      const auto& [problem, quantity, filling, run, level] = key;
-      std::vector<std::string> row{problem, quantity, filling, run, fmt::format("{:g}", -level)};
-      const std::vector<std::string> cells = best.setting.cells();
-      row.insert(row.end(), cells.begin() + 1, cells.end());
-      for (const std::string& cell :
-           {best.precision, best.safety > 0 ? fmt::format("{:g}", best.safety) : "",
-            fmt::format("{:.3g}", best.at.across), fmt::format("{:.4g}", best.at.seconds)}) {
-        row.push_back(cell);
-      }
-      table.row(row);
-    }
-  }
-
- private:
-  struct Best {
-    Setting setting;
-    std::string precision;
-    double safety = 0;
-    Reached at;
+/// Measures all settings. @returns their table
+CsvTable measured(const ErrorOptions& options, const ChosenDevice& device) {
+  const std::vector<AccuracyCase> problems = problems_of(options);
+  PrintedTable table(options.table, error_columns(), device_facts(device));
+  CsvTable all;
+  all.columns = error_columns();
+  const auto add_row = [&](const std::vector<std::string>& row) {
+    table.row(row);
+    all.rows.push_back(row);
   };
-  void look(const Setting& setting, const Family& family, const char* run,
-            const std::pair<std::string, double>& how, const std::vector<Measured>& measured) {
-    for (const double level : levels_) {
-      const std::optional<Reached> at = reach(measured, level / 100);
-      if (!at) continue;
-      const Best found{setting, how.first, how.second, *at};
-      const auto [best, is_new] = best_.try_emplace(
-          {family.problem, family.quantity, filling_name(setting.filling), run, -level}, found);
-      if (!is_new && at->seconds < best->second.at.seconds) best->second = found;
+  for (const Setting& setting : settings_of(options)) {
+    for (const int across : options.across) {
+      try {
+        measure(options, device, setting, across, problems, add_row);
+      } catch (const InputError& error) {  // too few phyxels for the inside of a mesh
+        fmt::print(stderr, "phyxel: {} is left out, {} across, factor {:g}: {}\n",
+                   filling_name(setting.filling), across, setting.factor, error.what());
+      }
     }
   }
-
-  std::vector<double> levels_;
-  std::map<std::tuple<std::string, std::string, std::string, std::string, double>, Best> best_;
-};
+  return all;
+}
 
 void bench_error(const ErrorOptions& options) {
-  const ChosenDevice device = choose_device(options.device);
-  const std::vector<AccuracyCase> problems = problems_of(options);
-  Fastest fastest(options.levels);
-  TableOptions summary{options.fastest, options.table.force, options.table.json};
-  {
-    PrintedTable table(
-        options.table,
-        {"problem", "quantity", "lattice", "factor", "hourglass", "closure", "across", "phyxels",
-         "neighbours", "error", "evaluations", "rest_seconds", "precision", "safety", "time_step_s",
-         "step_seconds", "seconds_per_simulated_second"},
-        device_facts(device));
-    for (const Setting& setting : settings_of(options)) {
-      const std::vector<Family> families =
-          FamilyRun(options, device, setting, table).measure(problems);
-      for (const Family& family : families) fastest.add(setting, family);
-      fastest.add_worst(setting, families);
-    }
+  CsvTable all;
+  Facts facts;
+  if (options.from.empty()) {
+    const ChosenDevice device = choose_device(options.device);
+    all = measured(options, device);
+    if (options.table.json && options.fastest.empty()) return;  // one object on stdout
+    facts = device_facts(device);
+  } else {
+    all = read_csv(options.from);
+    facts.emplace_back("from", all.fact("program") + " on " + all.fact("hardware"));
   }
-  if (options.table.json && options.fastest.empty()) return;  // one object on stdout
-  summary.json = false;
-  PrintedTable table(summary,
-                     {"problem", "quantity", "lattice", "run", "error_percent", "factor",
-                      "hourglass", "closure", "precision", "safety", "across", "seconds"},
-                     device_facts(device));
-  fastest.print(table);
+  const TableOptions summary{options.fastest, options.table.force, false};
+  PrintedTable table(summary, fastest_columns(), facts);
+  for (const auto& row : fastest_settings(all, options.levels)) table.row(row);
 }
 
 template <class T, class Check>
@@ -360,6 +257,9 @@ void add_bench_error(CLI::App& bench) {
   command->add_option("--seconds", options->seconds, "Least time of each measurement of steps [s]")
       ->check(CLI::Range(0.001, 100.0))
       ->capture_default_str();
+  command->add_option(
+      "--from", options->from,
+      "Measure nothing: take the errors and times from a table that --csv has written");
   command->add_option("--fastest", options->fastest,
                       "Also write the table of the fastest settings to this file");
   add_table_options(*command, options->table);

@@ -5,6 +5,8 @@
 #include <span>
 #include <vector>
 
+#include "csv.hpp"
+
 namespace phyxel::app {
 
 /// A discretisation of a family, which differ in resolution alone.
@@ -27,5 +29,17 @@ struct Reached {
 /// resolution are taken as powers of the error. None if they do not, or only at the finest
 /// resolution, beyond which nothing tells whether the error lasts.
 std::optional<Reached> reach(std::span<const Measured> family, double level);
+
+/// The columns of the table of all settings that `bench error` writes.
+const std::vector<std::string>& error_columns();
+/// The columns of the table of the fastest ones.
+const std::vector<std::string>& fastest_columns();
+
+/// The fastest setting for each problem, kind of cloud, kind of run ("rest" or "steps") and level:
+/// rows of `fastest_columns`. The problem "all" is the worst of all problems.
+/// @param measured a table with `error_columns`. @param levels errors to reach [%]
+/// @throws InputError for a table that lacks a column, or a cell that is no number
+std::vector<std::vector<std::string>> fastest_settings(const CsvTable& measured,
+                                                       std::span<const double> levels);
 
 }  // namespace phyxel::app

@@ -125,13 +125,13 @@ class DeviceSums {
     const std::vector<unsigned long long> words = fetched(words_);
     for (std::size_t s = 0; s < all.size(); ++s) {
       for (unsigned a = 0; a < accumulators_; ++a) {
-        ExactSum one;
-        const std::span<std::int64_t> into = one.ready();
+        // Words of carried sums are so small that those of one accumulator can be added.
+        const std::span<std::int64_t> into = all[s].ready();
         for (std::size_t w = 0; w < into.size(); ++w) {
-          into[w] = static_cast<std::int64_t>(words[(s * into.size() + w) * accumulators_ + a]);
+          into[w] += static_cast<std::int64_t>(words[(s * into.size() + w) * accumulators_ + a]);
         }
-        all[s].add(one);
       }
+      all[s].ready();
     }
     return all;
   }

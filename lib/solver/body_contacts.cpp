@@ -10,12 +10,20 @@
 #include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
+namespace {
+
+/// In 36 dinos that fall onto each other, half of the widest skin was fastest: a quarter took a
+/// tenth more time, all of it a third more.
+double widest_skin(const SurfaceLayer& layer) { return 0.5 * layer.most_skin(); }
+
+}  // namespace
+
 BodyContacts::BodyContacts(const Model& model, int threads)
     : model_(model),
       threads_(threads),
       layer_(model),
       points_(layer_),
-      watch_(layer_, threads),
+      watch_(layer_, threads, widest_skin(layer_)),
       pushes_(has_body_penalties(model)) {
   if (!acts()) return;
   rubs_ = pushes_ && has_body_friction(model.body_contact);

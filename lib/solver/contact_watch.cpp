@@ -34,19 +34,18 @@ constexpr double speeds_may_grow = 2;
 
 }  // namespace
 
-LayerWatch::LayerWatch(const SurfaceLayer& layer, int threads, int rarest)
+LayerWatch::LayerWatch(const SurfaceLayer& layer, int threads, double widest, int rarest)
     : layer_(layer),
       threads_(std::clamp(static_cast<int>(layer.phyxels().size() / 4000), 1, threads)),
       watch_(rarest),
+      widest_(std::max(widest, layer.least_skin())),
       skin_(layer.least_skin()),
       ways_(layer.groups().size()) {}
 
 void LayerWatch::set_skin(double speed, double dt) {
-  const int steps = 4 * watch_.rarest() + 8;  // some looks, and some steps more
-  // On the host, longer lists cost more than rarer searches save.
-  const double widest = (watch_.rarest() > 1 ? 1 : 0.5) * layer_.most_skin();
+  const int steps = 4 * watch_.rarest() + 8;        // some looks, and some steps more
   const double way = speeds_may_grow * speed * dt;  // in a step
-  skin_ = std::max(std::clamp(way * steps, layer_.least_skin(), widest), way);
+  skin_ = std::max(std::clamp(way * steps, layer_.least_skin(), widest_), way);
 }
 
 // Phyxels move by half a skin each. Speeds may grow until the next look.

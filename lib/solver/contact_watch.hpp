@@ -62,8 +62,9 @@ struct SurfaceWay {
 class LayerWatch {
  public:
   /// @param layer must outlive this. @param threads most threads that share the work
+  /// @param widest skin that is worth its time in each step [m], where one step does not need more
   /// @param rarest most steps between two looks (`ContactWatch`)
-  LayerWatch(const SurfaceLayer& layer, int threads, int rarest = 1);
+  LayerWatch(const SurfaceLayer& layer, int threads, double widest, int rarest = 1);
 
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return watch_.is_due(dt); }
@@ -122,7 +123,7 @@ class LayerWatch {
   const SurfaceLayer& layer_;
   int threads_;
   ContactWatch watch_;
-  double skin_;                   // [m]
+  double widest_, skin_;          // [m]
   std::vector<Vec3d> found_at_;   // [m], shape [layer]
   std::vector<SurfaceWay> ways_;  // of each group
   BodyReach reach_;               // when points were found

@@ -34,11 +34,12 @@ struct ContactRates {
 
 /// What obstacles do at the present state of a solver: in the next step of Verlet's method, or by
 /// the penalties of implicit steps and searches for equilibrium.
-/// @param state receives the present displacements and velocities
+/// @param state receives the present displacements and velocities; of a model without obstacles
+/// they may be missing
 ContactRates rates_now(const Model& model, Backend& backend, const Solver& solver, State& state) {
   if (solver.method() == Method::verlet) {
     if (auto next = next_step_of_device(backend, solver.time(), solver.dt())) {
-      backend.download(state);
+      if (!model.obstacles.empty()) backend.download(state);  // for depths in them
       return {std::move(next->sums), solver.dt(), std::move(next->depths)};
     }
     const PresentForces present(model, backend, solver);

@@ -53,6 +53,22 @@ TEST_F(BenchError, WritesTheFastestSettings) {
   EXPECT_THAT(test::text_of(folder_ / "error.csv"), HasSubstr("\ntension,ν,nodes,1.8,0.1,0,5,"));
 }
 
+TEST_F(BenchError, TakesTheTimesOfAnEarlierTable) {
+  const test::Outcome measured =
+      run({"bench", "error", "tension", "--across", "3,4", "--lattice", "nodes", "--factor", "1.8",
+           "--device", "cpu", "--seconds", "0.01", "--csv", "error.csv", "--fastest", "one.csv"});
+  ASSERT_EQ(measured.code, 0) << measured.err;
+  const test::Outcome again =
+      run({"bench", "error", "--from", "error.csv", "--fastest", "other.csv"});
+  ASSERT_EQ(again.code, 0) << again.err;
+  const auto rows_of = [&](const char* file) {
+    const std::string text = test::text_of(folder_ / file);
+    return text.substr(text.find("\nproblem,"));
+  };
+  EXPECT_EQ(rows_of("one.csv"), rows_of("other.csv"));
+  EXPECT_EQ(run({"bench", "error", "--from", "missing.csv"}).code, 2);
+}
+
 TEST_F(BenchError, RefusesUnknownProblems) {
   const test::Outcome bench = run({"bench", "error", "gravty"});
   EXPECT_EQ(bench.code, 2);

@@ -127,7 +127,7 @@ TEST(Copies, ActAsBodiesWithFieldsOfTheirOwn) {
 struct Watched {
   Model model;
   SurfaceLayer layer{model};
-  LayerWatch watch{layer, 1};
+  LayerWatch watch{layer, 1, 0.5 * layer.most_skin()};
   std::vector<Vec3d> way, velocity;  // of each body
 
   explicit Watched(const std::vector<Vec3d>& places) : model(model_of(places)) {
