@@ -57,8 +57,10 @@ Families families_of(const CsvTable& table) {
     const int across = static_cast<int>(table.number(r, "across"));
     const double error = table.number(r, "error");
     Key rest = key, steps = key;
-    rest.insert(rest.end(), {"rest", "", ""});
-    add(families, rest, {across, error, table.number(r, "rest_seconds")});
+    if (!table.text(r, "rest_seconds").empty()) {
+      rest.insert(rest.end(), {"rest", "", ""});
+      add(families, rest, {across, error, table.number(r, "rest_seconds")});
+    }
     if (table.text(r, "precision").empty()) continue;
     steps.insert(steps.end(), {"steps", table.text(r, "precision"), table.text(r, "safety")});
     add(families, steps, {across, error, table.number(r, "seconds_per_simulated_second")});

@@ -180,6 +180,41 @@ TEST_F(Patches, ShareTheEntriesOfAPointAmongItsRows) {
   EXPECT_EQ(in_patch, (std::vector<char>{0, 0, 1, 1, 1, 0, 0, 0, 0}));
 }
 
+TEST_F(Patches, SleepUntilAPhyxelMayHaveComeWithinRange) {
+  add(0, 0);  // the point
+  add(0, 1.5);
+  add(0, 1.2);
+  const std::vector<Index> near{1, 2};
+  const std::vector<Offset> start{0, 2, 2, 2, 2};
+  const ContactRow row;
+  SurfaceTouch touch;
+  std::vector<SurfaceShare> carries(near.size());
+  double wakes = 0;
+  PointWay way{.before = 7, .in_step = 0};
+  const ContactPasses passes{.site = sites_.data(),
+                             .motion = motions_.data(),
+                             .row = &row,
+                             .near_start = start.data(),
+                             .near = near.data(),
+                             .touch = &touch,
+                             .carries = carries.data(),
+                             .wakes = &wakes,
+                             .way = &way};
+  passes.find_touch(OneThread{}, 0);
+  EXPECT_TRUE(touch.is_alone);
+  // The nearest lacks a fifth of the range, and each of the two may have gone half of that.
+  EXPECT_NEAR(wakes, 7 + 0.1 * range, 1e-3 * range);
+  EXPECT_LT(wakes, 7 + 0.1 * range);
+  motions_[2].after = range * Vec3d{1.4, 0, 0};
+  const double before = wakes;
+  way.in_step = 0.09 * range;
+  passes.find_touch(OneThread{}, 0);  // asleep: not looked at
+  EXPECT_EQ(wakes, before);
+  way.in_step = 0.11 * range;
+  passes.find_touch(OneThread{}, 0);
+  EXPECT_NEAR(wakes, 7 + 0.31 * range, 2e-3 * range);
+}
+
 TEST_F(Patches, MayBeSeveralIfPhyxelsAreFarFromOthers) {
   add(0, 0.5);
   add(2.4, -0.5);
