@@ -7,6 +7,7 @@
 
 #include "model/contact.hpp"
 #include "model/rigid_tips.hpp"
+#include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
@@ -118,6 +119,15 @@ double smallest_support(const Model& model) {
   return model.share ? model.share->communicator->smallest(smallest) : smallest;
 }
 
+/// The fastest waves in the bodies of a model [m/s].
+double fastest_waves(const Model& model) {
+  double fastest = 0;
+  for (const Part& part : model.parts) {
+    fastest = std::max(fastest, pressure_wave_speed(part.material));
+  }
+  return fastest;
+}
+
 /// Ends a run, on all ranks alike.
 [[noreturn]] void say_wrong(const Model& model, const std::string& why) {
   if (model.share) throw AgreedError(ExitCode::diverged, why);
@@ -177,6 +187,15 @@ void check_contact_speeds(const Model& model, const Solver& solver, double large
   if (touching_count(model) == 0 || solver.method() == Method::equilibrium) return;
   const double dt = solver.dt(), support = smallest_support(model);
   if (const double way = 2 * largest_speed * dt; model.body_contact.acts() && way > 0.5 * support) {
+    // No impact that a step resolves does this.
+    if (const double waves = fastest_waves(model); largest_speed > 100 * waves) {
+      say_wrong(
+          model,
+          fmt::format("phyxels move at up to {:.3g} m/s, {:.2g} times as fast as waves in their "
+                      "bodies: something presses phyxels into each other that cannot give way, "
+                      "such as those of supports; allowed: motions that leave them room",
+                      largest_speed, largest_speed / waves));
+    }
     say_wrong(
         model,
         fmt::format("phyxels move at up to {:.3g} m/s, so that two bodies may move by {:.3g} m "

@@ -11,6 +11,7 @@
 #include <numbers>
 #include <random>
 
+#include "phyxel/error.hpp"
 #include "phyxel/reactions.hpp"
 #include "support/contact_scene.hpp"
 #include "support/strewn_surfaces.hpp"
@@ -440,6 +441,23 @@ TEST(BodyContacts, AreRefusedToBodiesThatOverlapAtTheStart) {
   EXPECT_EQ(refusal(end + touching + body("a", shape, "") +
                     body("b", shape, "translation = [0.2, 0.01, 0]\n")),
             "accepted");
+}
+
+TEST(BodyContacts, OfBodiesThatAreTooFastAreRefusedWithTheCause) {
+  Way way(meeting_balls(touching), dt);
+  const double waves = pressure_wave_speed(way.model.parts[0].material);
+  const auto message_at = [&](double speed) -> std::string {
+    try {
+      check_contact_speeds(way.model, way.solver, speed, {});
+    } catch (const DivergedError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(message_at(0.5 * waves), "");
+  EXPECT_THAT(message_at(50 * waves), ::testing::HasSubstr("might pass through each other"));
+  EXPECT_THAT(message_at(1e9 * waves), ::testing::HasSubstr("presses phyxels into each other that "
+                                                            "cannot give way"));
 }
 
 }  // namespace
