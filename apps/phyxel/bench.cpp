@@ -17,6 +17,7 @@
 #include "cantilever.hpp"
 #include "command.hpp"
 #include "device_option.hpp"
+#include "known_names.hpp"
 #include "model/box.hpp"
 #include "phyxel/phyxel.hpp"
 #include "printed_table.hpp"
@@ -169,12 +170,7 @@ std::vector<StepCase> step_cases(const BenchOptions& options) {
 
 void bench_step(const BenchOptions& options) {
   const ChosenDevice device = choose_device(options.device);
-  for (const std::string& terms : options.terms) {
-    if (std::find(all_terms.begin(), all_terms.end(), terms) == all_terms.end()) {
-      throw InputError(fmt::format("--terms {}: unknown{}; allowed: {}", terms,
-                                   did_you_mean(terms, all_terms), fmt::join(all_terms, ", ")));
-    }
-  }
+  check_known("--terms", options.terms, all_terms);
   PrintedTable table(options.table,
                      {"shape", "bodies", "terms", "precision", "path", "threads", "phyxels",
                       "neighbours", "surfels", "steps_per_s", "phyxel_steps_per_s", "spread",

@@ -14,6 +14,7 @@
 #include "accuracy/bar.hpp"
 #include "device_option.hpp"
 #include "fastest.hpp"
+#include "known_names.hpp"
 #include "phyxel/phyxel.hpp"
 #include "printed_table.hpp"
 #include "setup.hpp"
@@ -37,7 +38,7 @@ struct ErrorOptions {
   TableOptions table;
 };
 
-/// What all resolutions of a family have in common.
+/// A setting, which all resolutions of a family share.
 struct Setting {
   Filling filling;
   double factor, hourglass, closure;
@@ -79,52 +80,51 @@ struct StepTime {
   double seconds = 0;  ///< Of a step, on the device.
 };
 
-/// Measures them for some time [s].
-StepTime time_of_steps(const Discretisation& d, const ErrorOptions& options,
-                       const ChosenDevice& device, const std::string& precision) {
+/// Measures the steps of the bar in each precision, for `options.seconds` at least.
+std::map<std::string, StepTime> times_of_steps(const Discretisation& d, const ErrorOptions& options,
+                                               const ChosenDevice& device) {
   Scene scene = clamped(bar(d, 1, 0.2));
   scene.gravity = {0, 0, -0.1};
   const Cloud cloud = cloud_of(scene, d);
   const Model model = build_model(scene, std::span(&cloud, 1), device);
-  const auto backend =
-      make_backend(model, precision_option(precision), device, omp_get_max_threads());
-  StepTime found{.step = step_limit(model, *backend).largest_step};
-  Solver solver(*backend, initial_state(model, scene, options.safeties.front() * found.step));
-  solver.step(64);
-  backend->wait();
-  std::int64_t steps = 0;
-  const auto start = Clock::now();
-  while (seconds_since(start) < options.seconds) {
-    solver.step(256);
-    steps += 256;
+  std::map<std::string, StepTime> times;
+  for (const std::string& precision : options.precisions) {
+    const auto backend =
+        make_backend(model, precision_option(precision), device, omp_get_max_threads());
+    StepTime& found = times[precision];
+    found.step = step_limit(model, *backend).largest_step;
+    Solver solver(*backend, initial_state(model, scene, options.safeties.front() * found.step));
+    solver.step(64);
     backend->wait();
+    std::int64_t steps = 0;
+    const auto start = Clock::now();
+    while (seconds_since(start) < options.seconds) {
+      solver.step(256);
+      steps += 256;
+      backend->wait();
+    }
+    found.seconds = seconds_since(start) / static_cast<double>(steps);
   }
-  found.seconds = seconds_since(start) / static_cast<double>(steps);
-  return found;
+  return times;
 }
 
+/// The problems that the user has chosen, in the order of `phyxel accuracy`.
 std::vector<AccuracyCase> problems_of(const ErrorOptions& options) {
   std::vector<AccuracyCase> chosen;
   std::vector<std::string> known;
   for (const AccuracyCase& c : static_cases()) {
-    if (c.name != "patch" && c.name != "rotation") known.push_back(c.name);
-  }
-  for (const std::string& name : options.problems) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      throw InputError(fmt::format("problem {}: unknown{}; allowed: {}", name,
-                                   did_you_mean(name, known), fmt::join(known, ", ")));
-    }
-  }
-  for (const AccuracyCase& c : static_cases()) {
+    if (c.name == "patch" || c.name == "rotation") continue;
+    known.push_back(c.name);
     if (std::find(options.problems.begin(), options.problems.end(), c.name) !=
         options.problems.end()) {
       chosen.push_back(c);
     }
   }
+  check_known("problem", options.problems, known);
   return chosen;
 }
 
-/// Receives rows of `error_columns`.
+/// Receiver of rows of `error_columns`.
 using RowSink = std::function<void(const std::vector<std::string>&)>;
 
 /// True of problems on the bar whose steps are timed.
@@ -137,10 +137,9 @@ void measure(const ErrorOptions& options, const ChosenDevice& device, const Sett
              int across, const std::vector<AccuracyCase>& problems, const RowSink& add_row) {
   const Discretisation d = setting.at(across);
   std::map<std::string, StepTime> times;
-  const bool steps = std::any_of(problems.begin(), problems.end(),
-                                 [](const AccuracyCase& c) { return is_on_bar(c.name); });
-  for (const std::string& precision : options.precisions) {
-    if (steps) times[precision] = time_of_steps(d, options, device, precision);
+  if (std::any_of(problems.begin(), problems.end(),
+                  [](const AccuracyCase& c) { return is_on_bar(c.name); })) {
+    times = times_of_steps(d, options, device);
   }
   for (const AccuracyCase& problem : problems) {
     const Solution solution = problem.solve(d);

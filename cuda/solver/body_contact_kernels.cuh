@@ -85,7 +85,14 @@ __global__ void find_ways(Fields<Real, StateReal> f, const Index* place,
   ways[2 * numbers * blockIdx.x + threadIdx.x] = most;
 }
 
-/// Adds the way of points since the last call to that before.
+/// Raises a number to a positive value if it is smaller. Both are positive or zero: such doubles
+/// are in the order of their bits.
+static __device__ void raise_to(double* number, double value) {
+  atomicMax(reinterpret_cast<unsigned long long*>(number),
+            static_cast<unsigned long long>(__double_as_longlong(value)));
+}
+
+/// Adds the way of points in the last step to the way before it.
 static __device__ void add_way(PointWay& way) {
   way.before += way.in_step;
   way.in_step = 0;
@@ -126,11 +133,7 @@ __global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, Poi
   for (int lanes = 16; lanes > 0; lanes /= 2) {
     length = fmax(length, __shfl_down_sync(0xffffffff, length, lanes));
   }
-  // Positive doubles are in the order of their bits.
-  if (threadIdx.x % 32 == 0 && length > 0) {
-    atomicMax(reinterpret_cast<unsigned long long*>(&way->in_step),
-              static_cast<unsigned long long>(__double_as_longlong(length)));
-  }
+  if (threadIdx.x % 32 == 0 && length > 0) raise_to(&way->in_step, length);
 }
 
 // One group of threads per row or point.
@@ -170,10 +173,7 @@ static __global__ void find_depths(ContactPasses passes, const Index* body, int 
   const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (r >= rows || !passes.touch[r].is_inside || passes.row[r].point >= points) return;
   const double depth = -passes.touch[r].gap;
-  if (!(depth > 0)) return;
-  // Positive doubles are in the order of their bits.
-  atomicMax(reinterpret_cast<unsigned long long*>(deepest + body[passes.row[r].point]),
-            static_cast<unsigned long long>(__double_as_longlong(depth)));
+  if (depth > 0) raise_to(deepest + body[passes.row[r].point], depth);
 }
 
 /// Changes the velocities of points by penalties as a step starts. One group of threads per point.

@@ -18,6 +18,14 @@ inline void extend(Box& box, Vec3d x) {
   box.high = {std::max(box.high.x, x.x), std::max(box.high.y, x.y), std::max(box.high.z, x.z)};
 }
 
+/// The box around two boxes; the box of no points adds nothing.
+inline Box together(Box a, const Box& b) {
+  a.low = {std::min(a.low.x, b.low.x), std::min(a.low.y, b.low.y), std::min(a.low.z, b.low.z)};
+  a.high = {std::max(a.high.x, b.high.x), std::max(a.high.y, b.high.y),
+            std::max(a.high.z, b.high.z)};
+  return a;
+}
+
 /// True if a box is inside another one; the box of no points is inside all.
 inline bool is_within(const Box& inner, const Box& outer) {
   return inner.low.x >= outer.low.x && inner.low.y >= outer.low.y && inner.low.z >= outer.low.z &&

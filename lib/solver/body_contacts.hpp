@@ -27,7 +27,7 @@ class TouchingPoints {
   /// @param skin by which lists reach beyond ranges [m]
   void find(std::span<const Vec3d> position, double dt, double skin);
 
-  /// That of the lists [m].
+  /// The skin of the lists [m].
   double skin() const { return skin_; }
   /// The extents of bodies when points were found.
   const BodyReach& reach() const { return reach_; }

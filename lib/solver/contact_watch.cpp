@@ -70,81 +70,70 @@ bool LayerWatch::is_late_on_ranks(double dt) {
 }
 
 bool LayerWatch::is_late_here(double dt) {
-  if (watch_.has_found(dt) && !have_come_near(dt)) {
+  const BodyMotions bodies = body_motions(dt);
+  if (watch_.has_found(dt) && !have_come_near(bodies)) {
     watch_.put_off();
     return false;
   }
-  const double fastest = fastest_meeting(dt);
+  const double fastest = fastest_meeting(bodies);
   watch_.renew(dt);
   set_skin(fastest, dt);
   watch_.put_off(skin_ / std::max(speeds_may_grow * fastest * dt, 1e-300));
   return true;
 }
 
-std::vector<Box> LayerWatch::of_bodies(Box SurfaceWay::*of_group) const {
-  std::vector<Box> all(layer_.model().body_contact.distances.size(), no_box);
+LayerWatch::BodyMotions LayerWatch::body_motions(double dt) const {
+  const std::size_t count = layer_.model().body_contact.distances.size();
+  BodyMotions bodies{std::vector(count, no_box), std::vector(count, no_box), reach_.boxes};
   for (std::size_t g = 0; g < ways_.size(); ++g) {
-    const Box& box = ways_[g].*of_group;
-    Box& of_body = all[layer_.bodies()[layer_.groups()[g].begin]];
-    extend(of_body, box.low);
-    extend(of_body, box.high);
-  }
-  return all;
-}
-
-double LayerWatch::fastest_meeting(double dt) const {
-  const std::vector<Box> speeds = of_bodies(&SurfaceWay::speeds),
-                         moved = of_bodies(&SurfaceWay::moved);
-  if (watch_.generation() == 0) {  // it is not known which bodies are near each other
-    Box all = no_box;
-    for (const Box& some : speeds) {
-      if (!is_filled(some)) continue;
-      extend(all, some.low);
-      extend(all, some.high);
-    }
-    return is_filled(all) ? largest_difference(all, all) : 0;
+    const Index body = layer_.bodies()[layer_.groups()[g].begin];
+    bodies.speeds[body] = together(bodies.speeds[body], ways_[g].speeds);
+    bodies.ways[body] = together(bodies.ways[body], ways_[g].moved);
   }
   const double span = speeds_may_grow * watch_.rarest() * dt;
-  std::vector<Box> boxes = reach_.boxes;
-  for (std::size_t b = 0; b < boxes.size(); ++b) {
-    if (!is_filled(boxes[b])) continue;
-    boxes[b] = grown(sum_of(sum_of(boxes[b], moved[b]), speeds[b], span), 0.5 * layer_.most_skin());
+  for (std::size_t b = 0; b < bodies.boxes.size(); ++b) {
+    if (!is_filled(bodies.boxes[b])) continue;
+    bodies.ways[b] = sum_of(bodies.ways[b], bodies.speeds[b], span);
+    bodies.boxes[b] = sum_of(bodies.boxes[b], bodies.ways[b]);
+  }
+  return bodies;
+}
+
+template <class Visit>
+void LayerWatch::for_each_meeting(std::span<const Box> boxes, Visit&& visit) const {
+  for_each_overlap(boxes, visit);
+  for (std::size_t b = 0; b < boxes.size() && layer_.model().body_contact.self; ++b) {
+    if (is_filled(boxes[b])) visit(b, b);
+  }
+}
+
+double LayerWatch::fastest_meeting(const BodyMotions& bodies) const {
+  if (bodies.boxes.empty()) {
+    Box all = no_box;
+    for (const Box& speeds : bodies.speeds) all = together(all, speeds);
+    return is_filled(all) ? largest_difference(all, all) : 0;
+  }
+  std::vector<Box> boxes = bodies.boxes;
+  for (Box& box : boxes) {
+    if (is_filled(box)) box = grown(box, 0.5 * layer_.most_skin());
   }
   double fastest = 0;
-  const auto look_at = [&](std::size_t a, std::size_t b) {
-    fastest = std::max(fastest, largest_difference(speeds[a], speeds[b]));
-  };
-  for_each_overlap(boxes, look_at);
-  for (std::size_t b = 0; b < boxes.size() && layer_.model().body_contact.self; ++b) {
-    if (is_filled(boxes[b])) look_at(b, b);
-  }
+  for_each_meeting(boxes, [&](std::size_t a, std::size_t b) {
+    fastest = std::max(fastest, largest_difference(bodies.speeds[a], bodies.speeds[b]));
+  });
   return fastest;
 }
 
-// Until the next look, the speeds of bodies against each other may grow.
-bool LayerWatch::have_come_near(double dt) const {
+bool LayerWatch::have_come_near(const BodyMotions& bodies) const {
   const BodyContact& contact = layer_.model().body_contact;
-  const double span = watch_.rarest() * dt;
-  std::vector<Box> ways = of_bodies(&SurfaceWay::moved);  // up to the next look
-  const std::vector<Box> speeds = of_bodies(&SurfaceWay::speeds);
-  std::vector<Box> boxes = reach_.boxes;
-  for (std::size_t b = 0; b < boxes.size(); ++b) {
-    if (!is_filled(boxes[b])) continue;
-    ways[b] = sum_of(ways[b], speeds[b], speeds_may_grow * span);
-    boxes[b] = sum_of(boxes[b], ways[b]);
-  }
   bool is_late = false;
-  const auto look_at = [&](std::size_t a, std::size_t b) {
+  for_each_meeting(bodies.boxes, [&](std::size_t a, std::size_t b) {
     const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
     const std::vector<Index>& near = reach_.partners[a];
     const bool were_near = std::binary_search(near.begin(), near.end(), second);
-    is_late = is_late || (were_near ? largest_difference(ways[a], ways[b]) > skin_
+    is_late = is_late || (were_near ? largest_difference(bodies.ways[a], bodies.ways[b]) > skin_
                                     : contact.law_of(first, second) != nullptr);
-  };
-  for_each_overlap(boxes, look_at);
-  for (std::size_t b = 0; b < boxes.size() && contact.self; ++b) {
-    if (is_filled(boxes[b])) look_at(b, b);
-  }
+  });
   return is_late;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -111,12 +112,21 @@ class LayerWatch {
  private:
   bool is_late_on_ranks(double dt);
   bool is_late_here(double dt);
-  /// The ways of bodies, or their velocities, from those of groups.
-  std::vector<Box> of_bodies(Box SurfaceWay::*of_group) const;
+  /// The motions of bodies up to the next look, in which their speeds may grow.
+  struct BodyMotions {
+    std::vector<Box> speeds;  ///< Boxes of the velocities now [m/s], shape [bodies].
+    std::vector<Box> ways;    ///< Boxes of the ways since points were found [m], shape [bodies].
+    std::vector<Box> boxes;   ///< Boxes of the bodies [m]; empty before points are found.
+  };
+  BodyMotions body_motions(double dt) const;
+  /// Calls visit(a, b) for bodies whose boxes overlap; with a = b if bodies may touch themselves.
+  template <class Visit>
+  void for_each_meeting(std::span<const Box> boxes, Visit&& visit) const;
   /// True if bodies may touch in the next step at places that are not among the points.
-  bool have_come_near(double dt) const;
-  /// The largest speed of bodies against each other that may soon be near each other [m/s].
-  double fastest_meeting(double dt) const;
+  bool have_come_near(const BodyMotions& bodies) const;
+  /// The largest relative speed of bodies that may soon be near each other [m/s]; of all bodies
+  /// before points are found.
+  double fastest_meeting(const BodyMotions& bodies) const;
   /// Sets the skin for bodies that move against each other at a speed [m/s].
   void set_skin(double speed, double dt);
 

@@ -29,13 +29,13 @@ class RigidBodies {
   void put(std::span<const RigidState> states, double dt);
   const std::vector<RigidState>& states() const { return states_; }
 
-  /// What a step changes.
+  /// The state that a step changes.
   struct Kept {
     std::vector<RigidState> states;
     StepSums earlier;
   };
   Kept kept() const { return {states_, earlier_}; }
-  /// Takes steps since then back.
+  /// Returns to a kept state.
   void put_back(Kept kept) {
     states_ = std::move(kept.states);
     earlier_ = std::move(kept.earlier);

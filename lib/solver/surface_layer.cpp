@@ -58,13 +58,6 @@ void look_around(SurfaceSite& site, const PlacedDistances& own) {
   if (size > flat) site.level = own.gap(site.rest).distance;
 }
 
-/// The box around two boxes.
-Box together(Box a, const Box& b) {
-  extend(a, b.low);
-  extend(a, b.high);
-  return a;
-}
-
 }  // namespace
 
 SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {

@@ -100,6 +100,10 @@ TEST(FastestSettings, AreThoseOfEachProblemAndOfTheWorstOfAll) {
     if (found[3] == "steps") steps.push_back(found);
   }
   ASSERT_EQ(steps.size(), 3u);
+  // At 4 across alone, the third problem counts among all: no finer cloud shows that to last.
+  for (const auto& found : fastest_settings(table, std::vector<double>{10})) {
+    EXPECT_FALSE(found[0] == "all" && found[3] == "rest" && found[5] == "1.6");
+  }
   const auto is = [](const char* problem, const char* factor, const char* across,
                      const char* seconds) {
     return std::vector<std::string>{problem, *problem == 'a' ? "worst" : "deflection",

@@ -12,6 +12,7 @@
 #include "accuracy/accuracy.hpp"
 #include "accuracy/hard_cases.hpp"
 #include "device_option.hpp"
+#include "known_names.hpp"
 #include "phyxel/error.hpp"
 #include "printed_table.hpp"
 
@@ -37,12 +38,7 @@ std::vector<AccuracyCase> chosen_cases(const std::vector<std::string>& names) {
     if (!c.group.empty()) groups.insert(c.group);
   }
   known.insert(known.end(), groups.begin(), groups.end());
-  for (const std::string& name : names) {
-    if (std::find(known.begin(), known.end(), name) == known.end()) {
-      throw InputError(fmt::format("case {}: unknown{}; allowed: {}", name,
-                                   did_you_mean(name, known), fmt::join(known, ", ")));
-    }
-  }
+  check_known("case", names, known);
   for (const AccuracyCase& c : all) {
     const bool wanted = std::any_of(names.begin(), names.end(), [&](const std::string& name) {
       return name == c.name || name == "all" || (!c.group.empty() && name == c.group);

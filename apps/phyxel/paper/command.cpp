@@ -10,6 +10,7 @@
 
 #include "device_option.hpp"
 #include "files/atomic_file.hpp"
+#include "known_names.hpp"
 #include "outside_text.hpp"
 #include "paper.hpp"
 #include "paper/paper_model.hpp"
@@ -84,12 +85,7 @@ void say_files(const fs::path& folder) {
 /// Checks the names of bodies and tables. @throws InputError
 void check_names(const PaperOptions& options) {
   for (const std::string& body : options.request.bodies) paper::body_scene(body);
-  for (const std::string& table : options.tables) {
-    if (!contains(all_tables, table)) {
-      throw InputError(fmt::format("--table {}: unknown{}; allowed: {}", table,
-                                   did_you_mean(table, all_tables), fmt::join(all_tables, ", ")));
-    }
-  }
+  check_known("--table", options.tables, all_tables);
 }
 
 /// Checks that the folder has a table. @throws InputError

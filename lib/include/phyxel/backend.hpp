@@ -26,7 +26,7 @@ struct Exchanges {
   Traffic traffic;        ///< Of this rank, since the start.
 };
 
-/// What bodies and obstacles would do in a step, of one rank.
+/// The contact of one rank in a step that is tried and taken back.
 struct NextContacts {
   /// Words of exact sums, as of `Backend::step_sums` without those of motions.
   std::vector<std::int64_t> sums;
@@ -134,8 +134,8 @@ class Backend {
   /// t + dt adds its reactions times half the displacements over both steps beside t. Empty if no
   /// phyxel moves on a prescribed path, and then steps cost nothing more.
   virtual std::vector<std::int64_t> step_sums() const { return {}; }
-  /// What bodies and obstacles would do in the step of `dt` [s] from `time` [s], which is tried and
-  /// taken back; nothing where that is left to the host (`next_step`). Of a share: collective.
+  /// Tries the step of `dt` [s] from `time` [s], takes it back, and returns its contact; returns
+  /// nothing where the host finds that itself (`next_step`). Of a share: collective.
   virtual std::optional<NextContacts> next_contacts([[maybe_unused]] double time,
                                                     [[maybe_unused]] double dt) {
     return std::nullopt;

@@ -182,6 +182,32 @@ TEST(LayerWatch, LooksAtBodiesThatMoveAgainstEachOtherAlone) {
   EXPECT_TRUE(bodies.is_late());
 }
 
+TEST(LayerWatch, LooksAsSoonAsBodiesMayHaveGoneFartherThanTheSkin) {
+  const Watched bodies({{}, {0.25, 0, 0}});
+  LayerWatch rare(bodies.layer, 1, bodies.layer.least_skin(), 4);
+  double step = 2 * dt;
+  const auto next_look = [&](double speed) {
+    const auto state_of = [&](Index i) {
+      return SurfaceState{{}, {part_of(bodies.model, i).body == 0 ? speed : 0, 0, 0}};
+    };
+    step *= 0.5;  // a step of another size is looked at anew
+    EXPECT_TRUE(rare.is_late(step, state_of));
+    rare.found(bodies.layer.reach_at(std::vector<Vec3d>(bodies.layer.sites().size()), rare.skin()));
+    int steps = 1;
+    while (!rare.is_due(step)) ++steps;
+    return steps;
+  };
+  // Speeds may double; the widest skin that is worth its time is the narrowest one.
+  const auto speed_over = [&](double steps) {
+    return bodies.layer.least_skin() / (2 * steps * 0.5 * step);
+  };
+  EXPECT_EQ(next_look(speed_over(100)), 4);
+  EXPECT_EQ(next_look(speed_over(2.5)), 2);
+  EXPECT_EQ(next_look(speed_over(1.5)), 1);
+  EXPECT_EQ(next_look(speed_over(0.5)), 1);  // with a wider skin
+  EXPECT_GT(rare.skin(), 1.9 * bodies.layer.least_skin());
+}
+
 TEST(LayerWatch, LooksAnewWhereTheStepChanges) {
   Watched bodies({{}, {0.25, 0, 0}});
   EXPECT_TRUE(bodies.is_late());

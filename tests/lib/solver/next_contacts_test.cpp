@@ -1,4 +1,4 @@
-/// What readings of contact foresee of the next step, which a device tries and takes back.
+/// Readings of contact: they foresee the next step, which a device tries and takes back.
 #include <gtest/gtest.h>
 
 #include <algorithm>
