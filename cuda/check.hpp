@@ -50,6 +50,8 @@ class PooledMemory {
   ~PooledMemory();
   /// True if one exists in this thread.
   static bool is_used();
+  /// Returns the memory that the pool keeps, but for what is in use, to the device.
+  static void give_back() noexcept;
 
  private:
   bool is_here_ = false;  // the device has pools

@@ -242,4 +242,15 @@ PooledMemory::~PooledMemory() { pools -= is_here_ ? 1 : 0; }
 
 bool PooledMemory::is_used() { return pools > 0; }
 
+void PooledMemory::give_back() noexcept {
+  int device = 0;
+  cudaMemPool_t pool = nullptr;
+  if (cudaGetDevice(&device) != cudaSuccess ||
+      cudaDeviceGetDefaultMemPool(&pool, device) != cudaSuccess) {
+    return;  // a device without pools keeps nothing
+  }
+  cudaDeviceSynchronize();
+  cudaMemPoolTrimTo(pool, 0);
+}
+
 }  // namespace phyxel

@@ -4,6 +4,7 @@
 #include "paper/paper_model.hpp"
 #include "phyxel/error.hpp"
 #include "setup/closing.hpp"
+#include "setup/filling.hpp"
 #include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
 
@@ -42,6 +43,11 @@ Surveyor cuda_surveyor(int device) {
 ClosingSearch cuda_closing_search(int device) {
   use_cuda_device(device);
   return {};
+}
+
+std::shared_ptr<const FillingDevice> cuda_filling_device(int device, Index) {
+  use_cuda_device(device);
+  return nullptr;
 }
 
 std::unique_ptr<ShareSurveyor> cuda_share_surveyor(int device) {

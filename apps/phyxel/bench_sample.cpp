@@ -10,6 +10,7 @@
 
 #include "bench_body.hpp"
 #include "command.hpp"
+#include "device_option.hpp"
 #include "kind.hpp"
 #include "model/host_memory.hpp"
 #include "model/neighbour_search.hpp"
@@ -26,6 +27,7 @@ struct BenchSampleOptions {
   std::vector<Index> sizes = {1000, 10000, 100000};
   std::vector<int> threads = {omp_get_num_procs()};
   int repeats = 1, relaxations = SampleRequest{}.relaxations;
+  std::string device = "auto";
   TableOptions table;
 };
 
@@ -64,7 +66,7 @@ double spread_of(const std::vector<double>& values) {
 }
 
 /// Fills a surface `repeats` times. @returns the cells of its row that follow `threads`
-std::vector<std::string> measured(const Surface& surface, Index size,
+std::vector<std::string> measured(const Surface& surface, Index size, const ChosenDevice& device,
                                   const BenchSampleOptions& options) {
   std::vector<double> seconds;
   std::vector<std::string> stage_cells;  // of the last repeat, as all that follows
@@ -77,7 +79,8 @@ std::vector<std::string> measured(const Surface& surface, Index size,
     const MemoryGrowth memory;
     const StageTimes times;
     const auto start = Clock::now();
-    cloud = sample_surface(surface, {.phyxels = size, .relaxations = options.relaxations}, &report);
+    cloud = sample_surface(surface, {.phyxels = size, .relaxations = options.relaxations}, device,
+                           &report);
     seconds.push_back(seconds_since(start));
     bytes = memory.largest();
     for (const auto& [stage, column] : stages) {
@@ -105,7 +108,8 @@ void bench_sample(const BenchSampleOptions& options) {
   for (const char* column : {"bytes_per_phyxel", "smallest_gap", "gap_spread", "volume_spread"}) {
     columns.emplace_back(column);
   }
-  PrintedTable table(options.table, columns);
+  const ChosenDevice device = choose_device(options.device);
+  PrintedTable table(options.table, columns, device_facts(device));
   for (const std::string& mesh : options.meshes) {
     const Surface surface = read_mesh(mesh);
     for (const int threads : options.threads) {
@@ -115,7 +119,7 @@ void bench_sample(const BenchSampleOptions& options) {
                                         std::to_string(surface.triangle.size()),
                                         std::to_string(threads)};
         try {
-          for (std::string& cell : measured(surface, size, options)) {
+          for (std::string& cell : measured(surface, size, device, options)) {
             row.push_back(std::move(cell));
           }
         } catch (const InputError& error) {
@@ -146,8 +150,10 @@ void add_bench_sample(CLI::App& bench) {
       ->check(CLI::Range(0, 10000))
       ->capture_default_str();
   add_thread_counts(*command, options->threads);
+  command->add_option("--device", options->device, device_help)->capture_default_str();
   add_table_options(*command, options->table);
   command->footer(
+      "A GPU helps with bodies of 20,000 phyxels and more, whose clouds are the same.\n"
       "Columns: *_s are the seconds of each stage; bytes_per_phyxel is the most memory in use at\n"
       "a time, with the cloud; smallest_gap is the smallest distance to the nearest phyxel over\n"
       "the mean distance; gap_spread and volume_spread are standard deviations over means.\n"

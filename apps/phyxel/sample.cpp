@@ -9,8 +9,10 @@
 #include <optional>
 
 #include "command.hpp"
+#include "device_option.hpp"
 #include "files/atomic_file.hpp"
 #include "kind.hpp"
+#include "mesh/filling_device.hpp"
 #include "outside_text.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/error.hpp"
@@ -29,6 +31,7 @@ struct SampleOptions {
   std::optional<double> ratio;  ///< Set for a graded body.
   Grading grading;              ///< But for its ratio and its finer regions.
   std::vector<double> balls;    ///< Centres and radii of finer regions, four numbers each [m].
+  std::string device = "auto";
   bool force = false, json = false;
 };
 
@@ -142,18 +145,27 @@ void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleR
              static_cast<double>(cloud.position.size()) / seconds);
 }
 
+/// The device that helps: none for bodies that the host fills before a GPU has started, unless one
+/// is asked for.
+ChosenDevice device_for(const SampleOptions& options) {
+  check_device_name(options.device, "--device");
+  if (options.device == "auto" && options.phyxels < least_filled_by_device) return {};
+  return choose_device(options.device);
+}
+
 void sample(const SampleOptions& options) {
   const auto start = Clock::now();
   const SampleRequest request = request_of(options);
   expect_kind(options.mesh, {Kind::mesh});
   check_output(options);
+  const ChosenDevice device = device_for(options);
   SampleReport report;
   Cloud cloud;
   {
     const SetupProgress progress(options.json ? nullptr : stderr);
     const Surface surface = read_mesh(options.mesh);
     try {
-      cloud = sample_surface(surface, request, &report);
+      cloud = sample_surface(surface, request, device, &report);
     } catch (const InputError& error) {
       throw InputError(fmt::format("{}: {}", options.mesh.string(), error.what()));
     }
@@ -212,6 +224,7 @@ void add_sample(CLI::App& program) {
       ->type_size(4)
       ->expected(-1)
       ->needs(ratio);
+  command->add_option("--device", options->device, device_help)->capture_default_str();
   command->add_flag("--force", options->force, "Replace the file if it exists");
   command->add_flag("--json", options->json, "The summary as JSON, nothing else on stdout");
   command->footer(

@@ -56,7 +56,7 @@ class Simulation {
              const SceneOverrides& overrides)
       : scene_(with_overrides(scene, overrides)) {
     device_ = choose_device(scene_.solver.device, "device");
-    model_ = build_model(scene_, make_clouds(scene_, clouds), device_);
+    model_ = build_model(scene_, make_clouds(scene_, clouds, device_), device_);
     backend_ = make_backend(model_, scene_.solver.precision, device_, scene_.solver.threads);
     plan_ = plan_steps(scene_, model_, *backend_, overrides.unsafe_step);
     start(initial_state(model_, scene_, plan_.dt));

@@ -6,9 +6,12 @@
 #include <cmath>
 #include <numeric>
 
+#include "mesh/filling_device.hpp"
+#include "mesh/filling_rules.hpp"
 #include "mesh/random_bits.hpp"
 #include "parallel_sort.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
@@ -165,19 +168,42 @@ struct Candidate {
   double spacing;      ///< The one wanted there [m].
 };
 
+/// Points relative to `origin`.
+std::vector<Vec3d> from_origin(std::span<const Vec3d> points, Vec3d origin) {
+  return tabulated(points.size(), [&](std::size_t k) { return points[k] - origin; });
+}
+
+/// The number of the first sample point of each block, and of all at the end.
+std::vector<std::size_t> first_samples(const std::vector<SampleBlock>& blocks) {
+  std::vector<std::size_t> first{0};
+  for (const SampleBlock& block : blocks) first.push_back(first.back() + block.offset.size());
+  return first;
+}
+
+/// All sample points in their order, relative to `origin`.
+std::vector<Vec3d> all_in_order(const std::vector<SampleBlock>& blocks, Vec3d origin) {
+  const std::vector<std::size_t> first = first_samples(blocks);
+  std::vector<Vec3d> all(first.back());
+#pragma omp parallel for schedule(dynamic, 256)
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    for (std::size_t k = 0; k < blocks[b].offset.size(); ++k) {
+      all[first[b] + k] = blocks[b].position(k) - origin;
+    }
+  }
+  return all;
+}
+
 /// All sample points in random order, relative to `origin`.
 Bulk<Candidate> all_in_random_order(const std::vector<SampleBlock>& blocks,
                                     const SpacingField& spacing, Vec3d origin, std::uint64_t seed) {
-  std::vector<std::size_t> first{0};
-  for (const SampleBlock& block : blocks) first.push_back(first.back() + block.offset.size());
+  const std::vector<std::size_t> first = first_samples(blocks);
   Bulk<Candidate> all(first.back());
 #pragma omp parallel for schedule(dynamic, 256)
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     for (std::size_t k = 0; k < blocks[b].offset.size(); ++k) {
       const std::size_t sample = first[b] + k;
       const Vec3d place = blocks[b].position(k) - origin;
-      all[sample] = {mix_bits(mix_bits(seed ^ mix_bits(sample))), place,
-                     spacing.at(place + origin)};
+      all[sample] = {rank_of(sample, seed), place, spacing.at(place + origin)};
     }
   }
   parallel_sort(all, [](const Candidate& a, const Candidate& b) { return a.rank < b.rank; });
@@ -288,9 +314,14 @@ std::vector<char> accepted_in_order(const Spaced& spaced) {
 
 std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
                                    const SpacingField& spacing, double gap, std::uint64_t seed,
-                                   std::span<const Vec3d> before) {
+                                   std::span<const Vec3d> before, const SurfaceOnDevice* device) {
   if (blocks.empty()) return {};
   const Vec3d origin = blocks.front().centre;
+  if (device && spacing.is_uniform()) {
+    auto site = device->darts(all_in_order(blocks, origin), from_origin(before, origin),
+                              gap * spacing.coarsest(), seed);
+    if (site) return from_origin(*site, -origin);
+  }
   const Bulk<Candidate> all = all_in_random_order(blocks, spacing, origin, seed);
   Spaced taken(spacing, gap, before.size() + all.size() / 16);
   for (const Vec3d& p : before) taken.add(p - origin, spacing.at(p - origin + origin));

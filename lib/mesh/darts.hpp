@@ -10,6 +10,8 @@
 
 namespace phyxel {
 
+class SurfaceOnDevice;
+
 /// Selects exactly n sample points that keep a distance from each other. Random candidates are
 /// accepted if no point accepted before is within a radius, and the radius shrinks until n are
 /// found. Source: McCool and Fiume 1992 (dart throwing with a shrinking radius).
@@ -19,9 +21,10 @@ std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, 
                                std::uint64_t seed, std::span<const Vec3d> before = {});
 
 /// A maximal set of sample points at least `gap` spacings from each other and from those in
-/// `before`.
+/// `before`. @param device helps, or null
 std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
                                    const SpacingField& spacing, double gap, std::uint64_t seed,
-                                   std::span<const Vec3d> before);
+                                   std::span<const Vec3d> before,
+                                   const SurfaceOnDevice* device = nullptr);
 
 }  // namespace phyxel

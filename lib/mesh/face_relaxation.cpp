@@ -1,11 +1,13 @@
 #include "mesh/face_relaxation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <optional>
 
+#include "mesh/filling_device.hpp"
+#include "mesh/filling_rules.hpp"
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
+#include "mesh/triangle.hpp"
 #include "model/graded_hash.hpp"
 #include "model/space_filling_curve.hpp"
 #include "model/spatial_hash.hpp"
@@ -56,21 +58,6 @@ void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField&
 
 }  // namespace
 
-Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c) {
-  const Vec3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
-  const double d1 = dot(ab, ap), d2 = dot(ac, ap), d3 = dot(ab, bp), d4 = dot(ac, bp),
-               d5 = dot(ab, cp), d6 = dot(ac, cp);
-  if (d1 <= 0 && d2 <= 0) return a;
-  if (d3 >= 0 && d4 <= d3) return b;
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vc = d1 * d4 - d3 * d2, vb = d5 * d2 - d1 * d6, va = d3 * d6 - d5 * d4;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + (d1 / (d1 - d3)) * ab;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + (d2 / (d2 - d6)) * ac;
-  if (va <= 0 && d4 >= d3 && d5 >= d6) return b + ((d4 - d3) / (d4 - d3 + d5 - d6)) * (c - b);
-  const double all = va + vb + vc;
-  return a + (vb / all) * ab + (vc / all) * ac;
-}
-
 namespace {
 
 /// The pieces that sample points lie on, by the nearest of the points.
@@ -79,10 +66,10 @@ class NearestPiece {
   NearestPiece(std::span<const PointOn> sample, const SpacingField& spacing) : sample_(sample) {
     const auto place = in_bulk(sample.size(), [&](std::size_t k) { return sample[k].point; });
     if (spacing.is_uniform()) {
-      uniform_.emplace(place, 0.4 * spacing.coarsest());
+      uniform_.emplace(place, face_sample_cell * spacing.coarsest());
     } else {
       std::vector<double> size = spacing.at(place);
-      for (double& s : size) s *= 0.4;
+      for (double& s : size) s *= face_sample_cell;
       graded_.emplace(place, size);
     }
   }
@@ -101,24 +88,24 @@ class NearestPiece {
 
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
-                    const CutMargin& margin, int sweeps, Stage& stage) {
+                    const CutMargin& margin, int sweeps, Stage& stage,
+                    const SurfaceOnDevice* device) {
   order_along_curve(site, fixed);
+  if (device && margin.is_empty() && spacing.is_uniform() &&
+      device->even_out(site, {surface, sample, fixed, spacing.coarsest(), sweeps})) {
+    return;
+  }
   const NearestPiece nearest(sample, spacing);
   // The triangle on which each point lies.
   auto piece = in_bulk(site.size(), [&](std::size_t i) { return nearest.at(site[i]); });
   const auto corners_of = [&](std::size_t triangle) {
     const Triangle& t = surface.triangle[triangle];
-    return std::array{surface.position[t[0]], surface.position[t[1]], surface.position[t[2]]};
+    return Corners{surface.position[t[0]], surface.position[t[1]], surface.position[t[2]]};
   };
+  const auto nearest_piece = [&](Vec3d place) { return nearest.at(place); };
   const auto move = [&](std::size_t i, Vec3d before, Vec3d step) {
-    const auto [a, b, c] = corners_of(piece[i]);
-    const Vec3d normal = cross(b - a, c - a);
-    const double size2 = dot(normal, normal);
-    if (size2 > 0) step -= (dot(step, normal) / size2) * normal;
-    const Vec3d after = before + step;
-    const std::size_t triangle = nearest.at(after);
-    const auto [d, e, f] = corners_of(triangle);
-    const Vec3d on_face = nearest_on_triangle(after, d, e, f);
+    std::size_t triangle = piece[i];
+    const Vec3d on_face = moved_on_face(before, step, triangle, corners_of, nearest_piece);
     if (margin.contains(on_face)) return before;
     piece[i] = triangle;
     return on_face;

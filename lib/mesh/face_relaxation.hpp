@@ -14,9 +14,7 @@ namespace phyxel {
 
 class InsideSampler;
 class Stage;
-
-/// The point of a triangle nearest to `p`. Source: Ericson 2005, section 5.1.5.
-Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
+class SurfaceOnDevice;
 
 /// Evens out the distances between points on faces: they repel each other, move along the face, and
 /// are put back on the triangle of the nearest sample point. The first `fixed` points stay.
@@ -25,9 +23,11 @@ Vec3d nearest_on_triangle(Vec3d p, Vec3d a, Vec3d b, Vec3d c);
 /// @param spacing wanted distance between the points
 /// @param margin places that no point moves to
 /// @param stage is told the share of sweeps that is done
+/// @param device helps, or null
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
-                    const CutMargin& margin, int sweeps, Stage& stage);
+                    const CutMargin& margin, int sweeps, Stage& stage,
+                    const SurfaceOnDevice* device = nullptr);
 
 /// Evens out the distances between points on the boundary of a region inside a surface: they repel
 /// each other and are put back on the boundary, and stay inside the surface. The first `fixed`

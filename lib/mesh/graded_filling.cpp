@@ -194,7 +194,7 @@ class GradedSkin {
   const LatticeRequest& request_;
   const SpacingField& spacing_;
   std::vector<Vec3d> point_;
-  std::vector<InsideSampler::Ball> ball_;  ///< Ball of each point (`repelled_inside`).
+  std::vector<ClearBall> ball_;  ///< Ball of each point (`repelled_inside`).
   std::size_t first_inside_ = 0;
   std::optional<GradedRepulsion> repulsion_;
 };

@@ -10,6 +10,7 @@ namespace phyxel {
 namespace {
 
 constexpr int block_level = 2;  ///< A block has 2^2 voxels a side.
+static_assert(block_side == 1 << block_level);
 /// Number of tasks that balances the load of threads; each of fewer cells has up to eight children.
 constexpr std::size_t enough_tasks = InsideSampler::most_tasks / 8;
 
@@ -45,7 +46,9 @@ bool is_doubtful(double winding) { return std::abs(winding - std::round(winding)
 }  // namespace
 
 InsideSampler::Grid::Grid(const InsideSampler& sampler, const SampleSweep& asked, int levels)
-    : sweep(asked), voxel(asked.voxel), back(transpose(asked.turn)) {
+    : SampleGrid{asked.voxel, {}, asked.turn, asked.seed, asked.at_random},
+      sweep(asked),
+      back(transpose(asked.turn)) {
   const double half = 0.5 * static_cast<double>(std::int64_t{1} << levels);
   double x = half, y = half, z = half;
   if (!sweep.at_random) {
@@ -101,12 +104,9 @@ std::size_t InsideSampler::few_for_walking() const {
   return std::max(few_triangles, static_cast<std::size_t>(work / std::max<Offset>(probed, 1) / 8));
 }
 
-bool InsideSampler::stays_inside(Vec3d before, Vec3d after, double most, Ball& ball) const {
-  constexpr double rounding = 1e-6;
-  const auto holds = [&] { return norm(after - ball.middle) < (1 - rounding) * ball.radius; };
-  if (holds()) return true;
-  ball = {before, winding_number_.distance(before, most)};
-  return holds() || inside(after);
+bool InsideSampler::stays_inside(Vec3d before, Vec3d after, double most, ClearBall& ball) const {
+  return phyxel::stays_inside(winding_number_.view(), before, after, most, ball,
+                              [&](Vec3d place) { return inside(place); });
 }
 
 /// False if a separating axis shows that the triangle misses the cube. For an open surface only
@@ -277,25 +277,6 @@ void InsideSampler::fill(const Grid& grid, Cell& cell, SampleBlock& block,
   }
 }
 
-namespace {
-
-/// Random bits of a voxel's coordinate.
-std::uint64_t bits_of(std::int64_t coordinate) {
-  return mix_bits(static_cast<std::uint64_t>(coordinate));
-}
-/// Random bits of a row of voxels along z. @param x,y bits of its coordinates
-std::uint64_t bits_of_row(std::uint64_t seed, std::uint64_t x, std::uint64_t y) {
-  return mix_bits(mix_bits(seed ^ x) ^ y);
-}
-/// The position of a sample point in its voxel, in sides of the voxel. @param row bits of the
-/// voxel's row. @param z bits of its coordinate
-Vec3d random_in(std::uint64_t row, std::uint64_t z) {
-  const std::uint64_t bits = mix_bits(row ^ z);
-  return {unit_fraction(bits), unit_fraction(bits >> 21), unit_fraction(bits >> 42)};
-}
-
-}  // namespace
-
 /// Adds a sample for each voxel of a cell inside the surface, in the order of `split`.
 void InsideSampler::fill_known(const Grid& grid, const Cell& cell, SampleBlock& block,
                                SampleTally& tally) {
@@ -335,19 +316,10 @@ void InsideSampler::fill_known(const Grid& grid, const Cell& cell, SampleBlock& 
   if (cell.winding > 1.5) tally.repeated += voxels;
 }
 
-/// The sample point of a voxel, as an offset from a block's centre.
-Vec3<float> InsideSampler::sample_in(const Grid& grid, std::int64_t x, std::int64_t y,
-                                     std::int64_t z, Vec3d centre) {
-  Vec3d within{0.5, 0.5, 0.5};
-  if (grid.sweep.at_random) {
-    within = random_in(bits_of_row(grid.sweep.seed, bits_of(x), bits_of(y)), bits_of(z));
-  }
-  return grid.offset({x, y, z}, within, centre);
-}
-
 void InsideSampler::add_sample(const Grid& grid, const Cell& parent, const Cell& cell,
                                SampleBlock& block, SampleTally& tally) const {
-  block.offset.push_back(sample_in(grid, cell.x, cell.y, cell.z, block.centre));
+  const Voxel voxel{cell.x, cell.y, cell.z};
+  block.offset.push_back(grid.offset(voxel, grid.within(voxel), block.centre));
   const Vec3d rounded = block.position(block.offset.size() - 1);
   const double winding = cell.known                   ? cell.winding
                          : parent.measured && closed_ ? winding_from(grid, parent, rounded, tally)
@@ -398,13 +370,13 @@ SampleBlock InsideSampler::filled(const Grid& grid, Cell& cell, SampleTally& tal
   region.z = cell.z & -side;
   block.region = grid.middle(region);
   // Sample points are rounded to float.
-  block.region_radius = 0.5 * std::sqrt(3.0) * (static_cast<double>(side) + 1e-3) * grid.voxel;
+  block.region_radius = radius_of_samples(grid.voxel, side);
   fill(grid, cell, block, tally);
   return block;
 }
 
-SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_block,
-                                 Stage* stage) const {
+/// The whole surface as one cell, at a level at which voxels contain it.
+InsideSampler::Cell InsideSampler::root_of(const SampleSweep& sweep) const {
   Cell root;
   root.level = block_level;
   // A turned cube that contains the bounding box is as wide as the diagonal of the latter, at most;
@@ -412,13 +384,17 @@ SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_bl
   const double width =
       sweep.at_random ? extent_ * 1.001 + sweep.voxel : extent_ * 1.733 + 3 * sweep.voxel;
   while (sweep.voxel * static_cast<double>(std::int64_t{1} << root.level) < width) ++root.level;
-  const Grid grid(*this, sweep, root.level);
   root.triangles.resize(surface_.triangle.size());
   for (std::size_t t = 0; t < root.triangles.size(); ++t) root.triangles[t] = static_cast<Index>(t);
+  return root;
+}
 
-  SampleTally total;
-  std::vector<Cell> tasks{root};
-  while (total.work <= sweep.most_work && tasks.size() < enough_tasks && !tasks.empty() &&
+/// Divides the root into tasks for many threads, unless that takes too much work.
+std::vector<InsideSampler::Cell> InsideSampler::tasks_of(const Grid& grid, Cell root,
+                                                         SampleTally& total) const {
+  std::vector<Cell> tasks;
+  tasks.push_back(std::move(root));
+  while (total.work <= grid.sweep.most_work && tasks.size() < enough_tasks && !tasks.empty() &&
          tasks.front().level > block_level) {
     const auto n_cells = static_cast<std::ptrdiff_t>(tasks.size());
     std::vector<std::vector<Cell>> children(tasks.size());
@@ -437,7 +413,15 @@ SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_bl
       }
     }
   }
+  return tasks;
+}
 
+SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_block,
+                                 Stage* stage) const {
+  Cell root = root_of(sweep);
+  const Grid grid(*this, sweep, root.level);
+  SampleTally total;
+  std::vector<Cell> tasks = tasks_of(grid, std::move(root), total);
   WorkLimit limit{total.work, sweep.most_work};
   const auto n_tasks = static_cast<std::ptrdiff_t>(tasks.size());
   if (stage) stage->expect(tasks.size());
@@ -451,6 +435,46 @@ SampleTally InsideSampler::visit(const SampleSweep& sweep, const Visit& visit_bl
     if (stage) stage->count();
   }
   return total;
+}
+
+/// Adds the regions of a cell, in the order of `descend`.
+void InsideSampler::add_regions(const Grid& grid, Cell& cell,
+                                std::vector<SampleRegion>& regions) const {
+  if (cell.known && !(cell.winding > 0.5)) return;
+  const std::int64_t side = std::int64_t{1} << cell.level;
+  const double half = 0.5 * grid.voxel * static_cast<double>(side);
+  if (grid.sweep.wanted && !grid.sweep.wanted(grid.middle(cell), half)) return;
+  if (side > region_side) {
+    SampleTally unused;
+    for (Cell& child : split(grid, cell, unused)) add_regions(grid, child, regions);
+    return;
+  }
+  constexpr std::int64_t within = region_side - 1;
+  SampleRegion region{.corner = {cell.x & ~within, cell.y & ~within, cell.z & ~within},
+                      .blocks = 0xff,
+                      .inside = cell.known};
+  if (side == block_side) {
+    region.blocks = static_cast<std::uint8_t>(
+        1 << ((cell.x & within ? 1 : 0) + (cell.y & within ? 2 : 0) + (cell.z & within ? 4 : 0)));
+  }
+  regions.push_back(region);
+}
+
+InsideSampler::Regions InsideSampler::regions(const SampleSweep& sweep) const {
+  Cell root = root_of(sweep);
+  const Grid grid(*this, sweep, root.level);
+  SampleTally unused;
+  std::vector<Cell> tasks = tasks_of(grid, std::move(root), unused);
+  std::vector<std::vector<SampleRegion>> of_task(tasks.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t task = 0; task < tasks.size(); ++task) {
+    add_regions(grid, tasks[task], of_task[task]);
+  }
+  Regions found{grid, {}};
+  for (const std::vector<SampleRegion>& some : of_task) {
+    found.list.insert(found.list.end(), some.begin(), some.end());
+  }
+  return found;
 }
 
 SampleTally InsideSampler::collect(const SampleSweep& sweep, std::vector<SampleBlock>& blocks,

@@ -1,7 +1,6 @@
 /// Sample points that fill the inside of a surface evenly.
 #pragma once
 
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -10,6 +9,7 @@
 #include <optional>
 #include <vector>
 
+#include "mesh/sample_grid.hpp"
 #include "mesh/winding_number.hpp"
 #include "phyxel/cloud.hpp"
 
@@ -25,9 +25,7 @@ struct SampleBlock {
   double region_radius = 0;  ///< Radius of a ball that contains that cube [m]; 0: there is none.
   double voxel = 0;          ///< Side of the voxels, each with one sample point [m].
 
-  Vec3d position(std::size_t k) const {
-    return centre + Vec3d{offset[k].x, offset[k].y, offset[k].z};
-  }
+  Vec3d position(std::size_t k) const { return at_offset(centre, offset[k]); }
 };
 
 /// Counts made while sampling.
@@ -36,7 +34,7 @@ struct SampleTally {
   Offset doubtful = 0;  ///< Samples whose winding number is more than 0.1 from an integer.
   Offset repeated = 0;  ///< Samples with a winding number above one.
   /// Work done: one unit for each sample, each triangle tested against a cell or a line, and each
-  /// group of triangles in a winding number; `WindingNumber::angle_work` for each solid angle.
+  /// group of triangles in a winding number; `WindingView::angle_work` for each solid angle.
   Offset work = 0;
   void add(const SampleTally& other);
 };
@@ -85,17 +83,19 @@ class InsideSampler {
   SampleTally collect(const SampleSweep& sweep, std::vector<SampleBlock>& blocks,
                       Stage* stage = nullptr) const;
 
-  bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
-  /// A ball inside the surface that no triangle reaches.
-  struct Ball {
-    Vec3d middle;       ///< [m]
-    double radius = 0;  ///< [m]
+  /// The regions of a closed surface's inside that `visit` would take blocks from, in its order:
+  /// the points of those that do not lie inside as wholes have to be tested. A sweep's `wanted` is
+  /// not asked about single blocks of a region.
+  struct Regions {
+    SampleGrid grid;
+    std::vector<SampleRegion> list;
   };
-  /// True if a point inside a closed surface is inside after a step, too. Steps within a ball need
-  /// no winding number.
-  /// @param ball a ball around a former place of the same point; replaced once the point leaves it
-  /// @param most radius of the largest balls [m]
-  bool stays_inside(Vec3d before, Vec3d after, double most, Ball& ball) const;
+  Regions regions(const SampleSweep& sweep) const;
+
+  bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
+  /// Tells whether a step stays inside; see the function of that name.
+  bool stays_inside(Vec3d before, Vec3d after, double most, ClearBall& ball) const;
+  const WindingNumber& winding_number() const { return winding_number_; }
   /// Approximate number of voxels that the surface passes through; the sampler visits each.
   double surface_voxels(double voxel) const { return (area_ / voxel + length_) / voxel; }
   double area() const { return area_; }      ///< Area of the surface [m^2].
@@ -118,7 +118,7 @@ class InsideSampler {
     Offset most = 0;
     bool reached() const { return done.load(std::memory_order_relaxed) > most; }
   };
-  struct Grid {
+  struct Grid : SampleGrid {
     Grid(const InsideSampler& sampler, const SampleSweep& sweep, int levels);
     /// The same places, by voxels whose side is doubled `times` times.
     Grid coarser(int times) const {
@@ -128,30 +128,18 @@ class InsideSampler {
     }
 
     const SampleSweep& sweep;
-    double voxel;
     Mat3d back;  ///< Inverse of the turn.
-    Vec3d origin;
-    Vec3d place(double x, double y, double z) const {
-      const Vec3d from_origin = voxel * Vec3d{x, y, z};
-      return origin + (sweep.at_random ? from_origin : sweep.turn * from_origin);
-    }
-    /// A point of a voxel, as an offset from a block's centre. @param within in sides of the voxel
-    Vec3<float> offset(const std::array<std::int64_t, 3>& voxel_at, Vec3d within,
-                       Vec3d centre) const {
-      return to<float>(place(static_cast<double>(voxel_at[0]) + within.x,
-                             static_cast<double>(voxel_at[1]) + within.y,
-                             static_cast<double>(voxel_at[2]) + within.z) -
-                       centre);
-    }
     /// A vector's components along the edges of the voxels.
     Vec3d along_edges(Vec3d v) const { return sweep.at_random ? v : back * v; }
+    using SampleGrid::middle;
     Vec3d middle(const Cell& cell) const {
-      const double half = 0.5 * static_cast<double>(std::int64_t{1} << cell.level);
-      return place(static_cast<double>(cell.x) + half, static_cast<double>(cell.y) + half,
-                   static_cast<double>(cell.z) + half);
+      return middle({cell.x, cell.y, cell.z}, std::int64_t{1} << cell.level);
     }
   };
 
+  Cell root_of(const SampleSweep& sweep) const;
+  std::vector<Cell> tasks_of(const Grid& grid, Cell root, SampleTally& total) const;
+  void add_regions(const Grid& grid, Cell& cell, std::vector<SampleRegion>& regions) const;
   std::vector<Cell> split(const Grid& grid, Cell& cell, SampleTally& tally) const;
   std::size_t few_for_walking() const;
   /// @param a, b, c corners of the triangle, relative to the cube's middle and along its edges [m]
@@ -168,8 +156,6 @@ class InsideSampler {
   void fill(const Grid& grid, Cell& cell, SampleBlock& block, SampleTally& tally) const;
   static void fill_known(const Grid& grid, const Cell& cell, SampleBlock& block,
                          SampleTally& tally);
-  static Vec3<float> sample_in(const Grid& grid, std::int64_t x, std::int64_t y, std::int64_t z,
-                               Vec3d centre);
   void add_sample(const Grid& grid, const Cell& parent, const Cell& cell, SampleBlock& block,
                   SampleTally& tally) const;
 

@@ -4,7 +4,9 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
+#include <optional>
 
+#include "mesh/filling_device.hpp"
 #include "mesh/nearest_site.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/rooms.hpp"
@@ -19,12 +21,6 @@ namespace {
 
 // Distances below are in lattice constants, and were chosen by the accuracy of the clouds.
 
-/// Clearance below which a node moves.
-constexpr double moving_clearance = 2;
-/// Clearance from which a phyxel has the volume of a cell of the lattice.
-constexpr double regular_clearance = 3;
-/// Largest clearance that is found: moving nodes meet no nodes beyond it.
-constexpr double largest_clearance = 4;
 /// Clearance of the nodes nearest to the surface beyond which a coarser lattice is tried.
 constexpr double most_clearance = 0.8;
 /// Sample points for a volume along a lattice constant. Errors of bodies of 2,000 to 40,000 phyxels
@@ -37,13 +33,12 @@ class Depth {
   Depth(const LatticeRequest& request, double spacing)
       : spacing_(spacing),
         farthest_(request.sites.spacing.coarsest()),
-        site_(all_sites(request.sites), largest_clearance * spacing) {}
+        site_(all_sites(request.sites), depth_cell * spacing) {}
 
   /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
   /// spacings.
   bool is_deep(Vec3d middle, double radius, double least) const {
-    const double limit = radius + least * spacing_ + farthest_;
-    return site_.nearest(middle, limit).distance2 > limit * limit;
+    return phyxel::is_deep(site_, middle, radius, least * spacing_, farthest_);
   }
 
  private:
@@ -51,76 +46,67 @@ class Depth {
   SpatialHash site_;
 };
 
-/// Distances of places inside from the surface, from cuts and from the phyxels on them.
-class Clearance {
- public:
-  Clearance(const LatticeRequest& request, double spacing)
-      : spacing_(spacing),
-        site_(all_sites(request.sites), 2 * spacing),
-        sample_(samples(request, spacing), 0.6 * spacing) {}
-
-  /// The clearance of a place, in spacings; `largest_clearance` for all that is farther.
-  double at(Vec3d place) const {
-    const double far = largest_clearance * spacing_;
-    double clearance = std::min(far, std::sqrt(site_.nearest(place, far).distance2));
-    if (clearance < moving_clearance * spacing_) {
-      const double limit = clearance / sample_factor;
-      const double sampled = std::sqrt(sample_.nearest(place, limit).distance2);
-      clearance = std::min(clearance, sample_factor * sampled);
-    }
-    return clearance / spacing_;
+/// Sample points on the surface and on cuts, which nodes keep off [m].
+std::vector<Vec3d> marks_on_surface(const LatticeRequest& request, double spacing) {
+  std::vector<Vec3d> points;
+  for (const PointOn& p :
+       points_over(request.surface, SpacingField(spacing), surface_samples, request.seed + 1)) {
+    points.push_back(p.point);
   }
+  const std::vector<Vec3d>& on_cuts = request.sites.cut_points;
+  points.insert(points.end(), on_cuts.begin(), on_cuts.end());
+  return points;
+}
 
- private:
-  static std::vector<Vec3d> samples(const LatticeRequest& request, double spacing) {
-    std::vector<Vec3d> points;
-    for (const PointOn& p :
-         points_over(request.surface, SpacingField(spacing), surface_samples, request.seed + 1)) {
-      points.push_back(p.point);
-    }
-    const std::vector<Vec3d>& on_cuts = request.sites.cut_points;
-    points.insert(points.end(), on_cuts.begin(), on_cuts.end());
-    return points;
-  }
-
-  double spacing_;
-  SpatialHash site_, sample_;
-};
-
-struct Nodes {
-  Bulk<Vec3d> position;
-  Bulk<float> clearance;  ///< In spacings, shape [n_nodes].
-};
+/// The sweep over the nodes of a lattice.
+SampleSweep lattice_sweep(const LatticeRequest& request, double spacing) {
+  return {.voxel = spacing, .seed = request.seed, .at_random = false, .turn = turn_of_lattice()};
+}
 
 /// All nodes of the lattice inside, task by task.
-Nodes nodes_inside(const LatticeRequest& request, double spacing) {
+LatticeNodes nodes_on_host(const LatticeRequest& request, const SurfaceMarks& marks) {
+  const double spacing = marks.spacing;
   const Depth depth(request, spacing);
-  const Clearance clearance(request, spacing);
-  std::vector<Nodes> by_task(InsideSampler::most_tasks);
-  const double block_radius = 2 * std::numbers::sqrt3 * spacing;
+  const SpatialHash site(marks.sites, site_cell * spacing),
+      sample(marks.samples, sample_cell * spacing);
+  std::vector<LatticeNodes> by_task(InsideSampler::most_tasks);
   request.sampler.visit(
-      {.voxel = spacing, .seed = request.seed, .at_random = false, .turn = turn_of_lattice()},
-      [&](std::size_t task, const SampleBlock& block) {
-        Nodes& nodes = by_task[task];
-        const bool deep = depth.is_deep(block.centre, block_radius, largest_clearance);
+      lattice_sweep(request, spacing), [&](std::size_t task, const SampleBlock& block) {
+        LatticeNodes& nodes = by_task[task];
+        const bool deep = depth.is_deep(block.centre, radius_of_nodes(spacing), largest_clearance);
         for (std::size_t k = 0; k < block.offset.size(); ++k) {
           const Vec3d p = block.position(k);
           nodes.position.push_back(p);
-          nodes.clearance.push_back(static_cast<float>(deep ? largest_clearance : clearance.at(p)));
+          nodes.clearance.push_back(static_cast<float>(
+              deep ? largest_clearance : clearance_at(site, sample, p, spacing)));
         }
       });
   std::vector<std::size_t> first{0};  // of each task
-  for (const Nodes& nodes : by_task) first.push_back(first.back() + nodes.position.size());
-  Nodes all{Bulk<Vec3d>(first.back()), Bulk<float>(first.back())};
+  for (const LatticeNodes& nodes : by_task) first.push_back(first.back() + nodes.position.size());
+  LatticeNodes all{Bulk<Vec3d>(first.back()), Bulk<float>(first.back())};
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t task = 0; task < by_task.size(); ++task) {
-    Nodes& nodes = by_task[task];
+    LatticeNodes& nodes = by_task[task];
     const auto to = static_cast<std::ptrdiff_t>(first[task]);
     std::ranges::copy(nodes.position, all.position.begin() + to);
     std::ranges::copy(nodes.clearance, all.clearance.begin() + to);
     nodes = {};
   }
   return all;
+}
+
+/// All nodes of the lattice inside.
+LatticeNodes nodes_inside(const LatticeRequest& request, double spacing) {
+  const std::vector<Vec3d> sites = all_sites(request.sites),
+                           samples = marks_on_surface(request, spacing);
+  const SurfaceMarks marks{sites, samples, spacing, request.sites.spacing.coarsest()};
+  if (request.device) {
+    const auto regions = request.sampler.regions(lattice_sweep(request, spacing));
+    if (std::optional<LatticeNodes> nodes = request.device->nodes(regions, marks)) {
+      return std::move(*nodes);
+    }
+  }
+  return nodes_on_host(request, marks);
 }
 
 /// The elements of an array that are to be kept.
@@ -131,7 +117,7 @@ Bulk<T> kept_of(const Bulk<T>& values, const std::vector<Index>& kept) {
 
 /// Keeps the n nodes of largest clearance, in their order; of equal ones the first.
 /// @returns the smallest clearance kept
-float keep_farthest(Nodes& nodes, std::size_t n) {
+float keep_farthest(LatticeNodes& nodes, std::size_t n) {
   // Most nodes are so deep inside that all of them have the same clearance.
   const Bulk<float>& clearance = nodes.clearance;
   const auto all = static_cast<Index>(clearance.size());
@@ -170,39 +156,28 @@ double lattice_constant(double volume, double area, Index n) {
 /// The phyxels on the surface and on cuts, and the nodes near them.
 class Skin {
  public:
-  Skin(const LatticeRequest& request, Nodes& nodes, double spacing)
+  Skin(const LatticeRequest& request, LatticeNodes& nodes, double spacing)
       : request_(request),
         nodes_(nodes),
         spacing_(spacing),
+        device_(request.device),
         near_(chosen(0, static_cast<Index>(nodes.position.size()),
                      [&](Index i) { return nodes.clearance[i] < largest_clearance; })),
-        point_(all_sites(request.sites)),
-        ball_(near_.size()) {
+        point_(all_sites(request.sites)) {
     point_.resize(sites() + near_.size());
 #pragma omp parallel for schedule(static)
     for (std::size_t k = 0; k < near_.size(); ++k) point_[sites() + k] = nodes.position[near_[k]];
   }
 
-  /// Moves each node by the sum of the forces at the places before the sweep.
-  void sweep() {
-    const Repulsion repulsion(point_, spacing_);
-    Bulk<Vec3d> moved(near_.size());
-    const auto n = static_cast<std::ptrdiff_t>(near_.size());
-#pragma omp parallel
-    {
-#pragma omp for schedule(dynamic, 256)
-      for (std::ptrdiff_t k = 0; k < n; ++k) {
-        const Vec3d before = point_[sites() + k];
-        const auto step_of = [&](auto&& strength) {
-          return repulsion.step(before, static_cast<Index>(sites() + k), strength);
-        };
-        moved[k] = clearance_of(k) < moving_clearance
-                       ? repelled_inside(request_, before, ball_[k], step_of)
-                       : before;
-      }
-#pragma omp for schedule(static)
-      for (std::ptrdiff_t k = 0; k < n; ++k) point_[sites() + k] = moved[k];
+  /// Moves the nodes near the surface by sweeps of repulsion.
+  void even_out(Stage& stage) {
+    if (device_ && is_evened_out_by_device()) return;
+    ball_.resize(near_.size());
+    for (int done = 0; done < request_.sweeps; ++done) {
+      sweep();
+      stage.reach((done + 1.0) / request_.sweeps);
     }
+    release(ball_);
   }
 
   void write_back() {
@@ -215,13 +190,22 @@ class Skin {
   std::vector<double> gaps() const {
     // Those that are nearest to a node of less clearance are among the points.
     constexpr double known_clearance = largest_clearance - 1;
-    const SpatialHash hash(point_, spacing_);
+    const std::vector<char> wanted = tabulated(point_.size(), [&](std::size_t k) {
+      return static_cast<char>(k < sites() || clearance_of(k - sites()) < known_clearance);
+    });
+    std::optional<std::vector<double>> found;
+    if (device_) found = device_->gaps(point_, spacing_, wanted);
+    if (!found) {
+      const SpatialHash hash(point_, spacing_);
+      found = tabulated(point_.size(), [&](std::size_t k) {
+        if (!wanted[k]) return 0.0;
+        return std::sqrt(hash.nearest(point_[k], HUGE_VAL, static_cast<Index>(k)).distance2);
+      });
+    }
     std::vector<double> gap(sites() + nodes_.position.size(), spacing_);
 #pragma omp parallel for schedule(static)
     for (std::size_t k = 0; k < point_.size(); ++k) {
-      if (k >= sites() && clearance_of(k - sites()) >= known_clearance) continue;
-      gap[k < sites() ? k : sites() + static_cast<std::size_t>(near_[k - sites()])] =
-          std::sqrt(hash.nearest(point_[k], HUGE_VAL, static_cast<Index>(k)).distance2);
+      if (wanted[k]) gap[place_of(k)] = (*found)[k];
     }
     return gap;
   }
@@ -240,7 +224,7 @@ class Skin {
     double sum = 0;
     for (std::size_t k = 0; k < point_.size(); ++k) {
       if (!is_irregular(k)) continue;
-      irregular.push_back(k < sites() ? k : sites() + static_cast<std::size_t>(near_[k - sites()]));
+      irregular.push_back(place_of(k));
       volume[irregular.back()] = sampled[k];
       sum += sampled[k];
     }
@@ -251,11 +235,37 @@ class Skin {
   }
 
  private:
+  /// Moves each node by the sum of the forces at the places before the sweep.
+  void sweep() {
+    const Repulsion repulsion(point_, spacing_);
+    Bulk<Vec3d> moved(near_.size());
+    const auto n = static_cast<std::ptrdiff_t>(near_.size());
+#pragma omp parallel
+    {
+#pragma omp for schedule(dynamic, 256)
+      for (std::ptrdiff_t k = 0; k < n; ++k) {
+        const Vec3d before = point_[sites() + k];
+        const auto step_of = [&](auto&& strength) {
+          return repulsion.step(before, static_cast<Index>(sites() + k), strength);
+        };
+        moved[k] = moves(k) ? repelled_inside(request_, before, ball_[k], step_of) : before;
+      }
+#pragma omp for schedule(static)
+      for (std::ptrdiff_t k = 0; k < n; ++k) point_[sites() + k] = moved[k];
+    }
+  }
+
   std::size_t on_surface() const { return request_.sites.position.size(); }
   /// Phyxels on the surface and on cuts.
   std::size_t sites() const { return on_surface() + request_.sites.on_cuts.size(); }
   /// The clearance that the k-th node of the skin had in the lattice.
   float clearance_of(std::size_t k) const { return nodes_.clearance[near_[k]]; }
+  /// True if the k-th node of the skin moves.
+  bool moves(std::size_t k) const { return clearance_of(k) < moving_clearance; }
+  /// The number of a point of the skin among the sites and all nodes.
+  std::size_t place_of(std::size_t k) const {
+    return k < sites() ? k : sites() + static_cast<std::size_t>(near_[k - sites()]);
+  }
 
   /// Shares of the inside by sample points [m^3]. Cells end at cuts: a phyxel on a cut has none of
   /// the space in its region, unless no other phyxel is there.
@@ -278,23 +288,43 @@ class Skin {
       };
       std::function<bool(Vec3d)> counts;
       if (rooms.size() > 1) counts = [&](Vec3d p) { return rooms.room_of(p) == room; };
-      const std::vector<double> shares =
-          NearestSite(site, spacing_)
-              .volumes(request_.sampler,
-                       {.voxel = spacing_ / samples_along(request_.phyxels),
-                        .seed = request_.seed + 2,
-                        .wanted = wanted},
-                       stage, counts);
+      const SampleSweep sweep{.voxel = spacing_ / samples_along(request_.phyxels),
+                              .seed = request_.seed + 2,
+                              .wanted = wanted};
+      std::vector<double> shares;
+      if (device_ && !counts) shares = volumes_by_device(sweep, site);
+      if (shares.empty()) {
+        shares = NearestSite(site, spacing_).volumes(request_.sampler, sweep, stage, counts);
+      }
       for (std::size_t k = 0; k < site.size(); ++k) volume[here[k]] = shares[k];
     }
     return volume;
   }
+
+  bool is_evened_out_by_device() {
+    const std::vector<char> moving =
+        tabulated(near_.size(), [&](std::size_t k) { return static_cast<char>(moves(k)); });
+    return device_->repel(point_, {.moves = moving,
+                                   .fixed = sites(),
+                                   .on_surface = static_cast<Index>(on_surface()),
+                                   .spacing = spacing_,
+                                   .clear = request_.sites.spacing.coarsest(),
+                                   .sweeps = request_.sweeps});
+  }
+  /// The volumes [m^3] that sample points give to sites; none if the device has none.
+  std::vector<double> volumes_by_device(const SampleSweep& sweep,
+                                        std::span<const Vec3d> site) const {
+    const auto count = device_->samples_of_sites(request_.sampler.regions(sweep), site, spacing_);
+    return count ? volumes_of_samples(*count, sweep.voxel) : std::vector<double>{};
+  }
+
   const LatticeRequest& request_;
-  Nodes& nodes_;
+  LatticeNodes& nodes_;
   double spacing_;
-  std::vector<Index> near_;   ///< Nodes whose clearance is known.
-  std::vector<Vec3d> point_;  ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
-  std::vector<InsideSampler::Ball> ball_;  ///< Ball of each node of `near_` (`repelled_inside`).
+  const SurfaceOnDevice* device_;
+  std::vector<Index> near_;      ///< Nodes whose clearance is known.
+  std::vector<Vec3d> point_;     ///< Phyxels on surface and cuts, then the nodes of `near_` [m].
+  std::vector<ClearBall> ball_;  ///< Ball of each node of `near_` (`repelled_inside`).
 };
 
 }  // namespace
@@ -321,7 +351,7 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
   const auto n = static_cast<std::size_t>(request.phyxels);
   double spacing = lattice_constant(
       request.volume, request.sampler.area() + 2 * request.sites.cut_area, request.phyxels);
-  Nodes nodes;
+  LatticeNodes nodes;
   constexpr int most_coarser = 12, most_attempts = 40;
   for (int attempt = 0;; ++attempt) {
     nodes = nodes_inside(request, spacing);
@@ -344,10 +374,7 @@ LatticeFilling fill_by_lattice(const LatticeRequest& request) {
 
   Stage relaxing("evening out distances");
   Skin skin(request, nodes, spacing);
-  for (int sweep = 0; sweep < request.sweeps; ++sweep) {
-    skin.sweep();
-    relaxing.reach((sweep + 1.0) / request.sweeps);
-  }
+  skin.even_out(relaxing);
   skin.write_back();
   relaxing.finish();
 

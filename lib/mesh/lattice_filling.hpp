@@ -6,12 +6,15 @@
 #include <vector>
 
 #include "bulk.hpp"
+#include "mesh/filling_rules.hpp"
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
 #include "mesh/surface_sites.hpp"
 #include "phyxel/cloud.hpp"
 
 namespace phyxel {
+
+class SurfaceOnDevice;
 
 /// A surface to fill, and the number of phyxels to fill it with.
 struct LatticeRequest {
@@ -23,6 +26,7 @@ struct LatticeRequest {
   Index phyxels = 0;             ///< Number of phyxels inside, 1 or more.
   std::uint64_t seed = 1;        ///< Seed of the lattice's position and of sample points.
   int sweeps = 10;               ///< Sweeps that move the nodes near the surface.
+  const SurfaceOnDevice* device = nullptr;  ///< Helps, or null.
 };
 
 /// Phyxels inside a surface, and the volumes of all its phyxels.
@@ -41,34 +45,18 @@ struct LatticeFilling {
 inline constexpr double usual_clearance = 0.62, least_clearance = 0.45;
 /// Sample points on the surface, from which nodes keep off too, for each square of the spacing.
 inline constexpr double surface_samples = 12;
-/// A distance to a sample point of the surface counts that many times: nodes keep off the middle of
-/// a face nearly as far as off a phyxel on it.
-inline constexpr double sample_factor = 1.2;
-
 /// Phyxels on the surface, then those on cuts [m].
 std::vector<Vec3d> all_sites(const SurfaceSites& sites);
 
-/// Strength of the repulsion by a phyxel on the surface. Nodes then keep the distance from it at
-/// which closed bars bend right.
-inline constexpr double surface_strength = 0.85;
-
-/// The place of a point inside after a step of repulsion; the place before it if the step would
-/// leave the surface [m]. @param ball see `InsideSampler::stays_inside`
-/// @param step_of step_of(strength) is the step [m], with a strength for each other point
+/// The place of a point inside after a step of repulsion; see the function in filling_rules.hpp.
+/// @param ball see `stays_inside`
 template <class StepOf>
-Vec3d repelled_inside(const LatticeRequest& request, Vec3d before, InsideSampler::Ball& ball,
+Vec3d repelled_inside(const LatticeRequest& request, Vec3d before, ClearBall& ball,
                       StepOf&& step_of) {
   const auto on_surface = static_cast<Index>(request.sites.position.size());
-  bool beside_surface = false;
-  const auto strength = [&](Index other) {
-    beside_surface |= other < on_surface;
-    return other < on_surface ? surface_strength : 1;
-  };
-  const Vec3d after = before + step_of(strength);
-  // Only nodes beside phyxels on the surface can leave it.
-  const bool stays = !beside_surface || request.sampler.stays_inside(
-                                            before, after, request.sites.spacing.coarsest(), ball);
-  return stays ? after : before;
+  return repelled_inside(on_surface, before, step_of, [&](Vec3d after) {
+    return request.sampler.stays_inside(before, after, request.sites.spacing.coarsest(), ball);
+  });
 }
 
 /// The turn of the lattice, by a unit quaternion of whole numbers: no direction of the lattice is

@@ -4,22 +4,17 @@
 
 #include <algorithm>
 
+#include "mesh/filling_rules.hpp"
 #include "mesh/nearest_points.hpp"
 #include "stage.hpp"
+#include "tabulated.hpp"
 
 namespace phyxel {
 namespace {
 
-/// A hash with cells at least 1.2 spacings wide, and wider if the sites are sparse: in a sheet or
-/// thread thinner than a spacing, sites are many spacings apart, and a search would visit empty
-/// cells.
 SpatialHash hash_of(const std::vector<Vec3d>& site, double spacing) {
-  SpatialHash hash(site, 1.2 * spacing);
-  // Occupied cells have 1.9 sites on average if the sites fill space, more than 1.05 on a face.
-  while (hash.mean_occupancy() < 1.05 && site.size() > 1) {
-    hash = SpatialHash(site, 2 * hash.cell_size());
-  }
-  return hash;
+  return widened_table(site.size(), spacing,
+                       [&](double cell_size) { return SpatialHash(site, cell_size); });
 }
 
 }  // namespace
@@ -43,33 +38,13 @@ void NearestSite::Sites<Real>::add(Index site, Vec3d place) {
   z.push_back(static_cast<Real>(place.z));
 }
 
-namespace {
-
-constexpr double slack = 1 + 1e-6;
-
-/// False if a site cannot be nearest to any point of a ball: if the plane half-way between it and
-/// the site nearest to the middle does not cut the ball.
-/// @param apart vector from the middle to the site, and @param nearest to the nearest site [m]
-bool may_be_nearest(Vec3d apart, Vec3d nearest, double radius) {
-  const double beyond = dot(apart, apart) - dot(nearest, nearest);
-  const Vec3d between = apart - nearest;
-  return !(beyond > 0 && beyond * beyond > 4 * radius * radius * slack * dot(between, between));
-}
-
-}  // namespace
-
 /// Finds the sites that may be nearest to a point of a ball, unless they were found last.
 void NearestSite::find_region(Vec3d middle, double radius, Scratch& s) const {
   if (s.region.x == middle.x && s.region.y == middle.y && s.region.z == middle.z) return;
   s.region = middle;
   s.of_region.clear();
-  const Vec3d nearest = hash_.nearest(middle).apart;
-  // Sites farther away are beyond the planes, too.
-  const double reach = (norm(nearest) + 2 * radius) * slack;
-  hash_.visit_ball(middle, reach, [&](const SpatialHash::Entry& entry) {
-    if (may_be_nearest(entry.position - middle, nearest, radius)) {
-      s.of_region.add(entry.index, entry.position);
-    }
+  visit_nearest_sites(hash_, middle, radius, [&](const SpatialHash::Entry& entry) {
+    s.of_region.add(entry.index, entry.position);
   });
 }
 
@@ -86,7 +61,7 @@ void NearestSite::find(const SampleBlock& block, Scratch& s) const {
     s.z[k] = p.z;
     ball2 = std::max(ball2, dot(p, p));
   }
-  const double ball = std::sqrt(static_cast<double>(ball2)) * slack;
+  const double ball = radius_of_block(ball2);
 
   if (block.region_radius > 0) {
     find_region(block.region, block.region_radius, s);
@@ -145,12 +120,13 @@ std::vector<std::uint32_t> NearestSite::samples_of_sites(
 std::vector<double> NearestSite::volumes(const InsideSampler& sampler, const SampleSweep& sweep,
                                          Stage& stage,
                                          const std::function<bool(Vec3d)>& counts) const {
-  const std::vector<std::uint32_t> count = samples_of_sites(sampler, sweep, stage, counts);
-  std::vector<double> volume(sites_);
-  for (std::size_t i = 0; i < sites_; ++i) {
-    volume[i] = std::max(0.5, double(count[i])) * std::pow(sweep.voxel, 3);
-  }
-  return volume;
+  return volumes_of_samples(samples_of_sites(sampler, sweep, stage, counts), sweep.voxel);
+}
+
+std::vector<double> volumes_of_samples(const std::vector<std::uint32_t>& count, double voxel) {
+  return tabulated(count.size(), [&](std::size_t i) {
+    return std::max(0.5, double(count[i])) * std::pow(voxel, 3);
+  });
 }
 
 }  // namespace phyxel

@@ -11,6 +11,22 @@
 
 namespace phyxel {
 
+/// Makes a table of sites with cells at least 1.2 spacings wide, and wider if the sites are sparse:
+/// in a sheet or thread thinner than a spacing, sites are many spacings apart, and a search would
+/// visit empty cells.
+/// @param make make(cell_size) makes a table
+template <class Make>
+auto widened_table(std::size_t sites, double spacing, Make&& make) {
+  auto table = make(1.2 * spacing);
+  // Occupied cells have 1.9 sites on average if the sites fill space, more than 1.05 on a face.
+  while (table.mean_occupancy() < 1.05 && sites > 1) table = make(2 * table.cell_size());
+  return table;
+}
+
+/// The volumes [m^3] of sites that got so many sample points; one without any gets half of one's.
+/// @param voxel side of the voxels [m]
+std::vector<double> volumes_of_samples(const std::vector<std::uint32_t>& count, double voxel);
+
 /// Search for the nearest of a set of sites for each point of a block.
 class NearestSite {
  public:

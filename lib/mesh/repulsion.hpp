@@ -6,41 +6,15 @@
 #include <span>
 #include <vector>
 
+#include "mesh/filling_rules.hpp"
 #include "mesh/point_tree.hpp"
 #include "mesh/spacing_field.hpp"
 #include "model/spatial_hash.hpp"
 
 namespace phyxel {
 
-/// Distance at which the repulsion ends, in spacings.
-inline constexpr double repulsion_reach = 1.8;
-/// Longest step of a sweep, in spacings.
-inline constexpr double longest_step = 0.15;
-
 /// Sweeps of repulsion that even out distances as well as `relaxations` of Lloyd's relaxation.
 inline int repulsion_sweeps(int relaxations) { return (relaxations + 2) / 3; }
-
-/// The sum of the forces (1 - r / reach)² that points push another one away with.
-class ForceSum {
- public:
-  /// Adds the force of a point. @param apart the vector from that point [m], and the square of its
-  /// length [m²]; not zero. @param reach larger than its length [m]
-  void add(Vec3d apart, double distance2, double reach, double strength) {
-    const double r = std::sqrt(distance2), rest = 1 - r / reach;
-    sum_ += (strength * rest * rest / r) * apart;
-  }
-  /// The step [m] of the point, in proportion to the sum and no longer than `longest_step`. A
-  /// displaced node of a cubic lattice of the spacing goes 0.6 times its displacement back.
-  Vec3d step(double spacing) const {
-    constexpr double mobility = 0.6;  // the stiffness of a cubic lattice is 1.00
-    const Vec3d step = mobility * sum_;
-    const double length = norm(step);
-    return (length > longest_step ? longest_step / length : 1) * spacing * step;
-  }
-
- private:
-  Vec3d sum_;
-};
 
 /// Points that push each other away until all have the same distances.
 class Repulsion {
@@ -53,15 +27,7 @@ class Repulsion {
   /// @param strength strength(index) multiplies the force of a point
   template <class Strength>
   Vec3d step(Vec3d place, Index self, Strength&& strength) const {
-    const double reach = repulsion_reach * spacing_;
-    ForceSum force;
-    hash_.visit_ball(place, reach, [&](const SpatialHash::Entry& entry) {
-      const Vec3d d = place - entry.position;
-      const double r2 = dot(d, d);
-      if (entry.index == self || r2 >= reach * reach || r2 == 0) return;
-      force.add(d, r2, reach, strength(entry.index));
-    });
-    return force.step(spacing_);
+    return step_of_repulsion(hash_, place, self, spacing_, strength);
   }
 
  private:

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "mesh/face_relaxation.hpp"
+#include "mesh/filling_device.hpp"
 #include "mesh/graded_filling.hpp"
 #include "mesh/grading.hpp"
 #include "mesh/inside_filling.hpp"
@@ -14,6 +14,7 @@
 #include "mesh/scattered_filling.hpp"
 #include "mesh/surface_sites.hpp"
 #include "mesh/surface_topology.hpp"
+#include "mesh/triangle.hpp"
 #include "model/closing_areas.hpp"
 #include "model/cloud_check.hpp"
 #include "model/graded_hash.hpp"
@@ -221,7 +222,8 @@ SpacingField wanted_spacing(const PreparedSurface& prepared, const InsideSampler
 /// Phyxels on the surface; none if the request or the surface does not allow them.
 SurfaceSites place_on_surface(const PreparedSurface& prepared, const InsideSampler& sampler,
                               const InsideFilling& filling, double volume,
-                              const SampleRequest& request, SampleReport& found) {
+                              const SampleRequest& request, SampleReport& found,
+                              const SurfaceOnDevice* device) {
   Stage stage("phyxels on the surface");
   SurfaceSites sites;
   try {
@@ -232,7 +234,7 @@ SurfaceSites place_on_surface(const PreparedSurface& prepared, const InsideSampl
     }
     sites = sites_on(prepared.surface, prepared.topology, volume,
                      wanted_spacing(prepared, sampler, filling, volume, request), sampler, cuts,
-                     request.phyxels, request.seed + 3, request.relaxations, stage);
+                     request.phyxels, request.seed + 3, request.relaxations, stage, device);
   } catch (const InputError& error) {
     if (request.on_surface) throw;
     if (request.grading) {
@@ -285,7 +287,8 @@ void report_tally(const PreparedSurface& prepared, const SampleTally& tally, Sam
 /// @returns the distances between phyxels
 SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& sampler,
                           const SampleRequest& request, const SurfaceSites& sites, double volume,
-                          bool exact_volume, Cloud& cloud, std::vector<double>& gap) {
+                          bool exact_volume, const SurfaceOnDevice* device, Cloud& cloud,
+                          std::vector<double>& gap) {
   const auto placed = static_cast<Index>(sites.position.size() + sites.on_cuts.size());
   const LatticeRequest lattice{.surface = prepared.surface,
                                .sampler = sampler,
@@ -294,7 +297,8 @@ SpacingField fill_between(const PreparedSurface& prepared, const InsideSampler& 
                                .exact_volume = exact_volume,
                                .phyxels = request.phyxels - placed,
                                .seed = request.seed,
-                               .sweeps = repulsion_sweeps(request.relaxations)};
+                               .sweeps = repulsion_sweeps(request.relaxations),
+                               .device = device};
   SpacingField spacing = sites.spacing;
   LatticeFilling inside =
       spacing.is_uniform() ? fill_by_lattice(lattice) : fill_graded(lattice, spacing);
@@ -366,6 +370,11 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   PreparedSurface prepared = prepare(surface, found);
   const bool closed = prepared.topology.closed;
   const InsideSampler sampler(prepared.surface, closed);
+  std::unique_ptr<SurfaceOnDevice> device;
+  if (const FillingDevice* const chosen = FillingScope::device();
+      chosen && closed && !request.grading) {
+    device = chosen->take(sampler.winding_number(), request.phyxels);
+  }
 
   SurfaceSites sites;
   SampleTally tally;
@@ -385,7 +394,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
     const InsideFilling filling =
         filled(prepared, sampler, request, std::clamp(1.0 * request.phyxels, least, 1e6));
     measure(filling);
-    sites = place_on_surface(prepared, sampler, filling, volume, request, found);
+    sites = place_on_surface(prepared, sampler, filling, volume, request, found, device.get());
   }
   Cloud cloud;
   SpacingField spacing(0);
@@ -398,7 +407,8 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
     spacing = SpacingField(std::cbrt(volume / request.phyxels));
     fill_scattered(sampler, filling, request, spacing.coarsest(), cloud);
   } else {
-    spacing = fill_between(prepared, sampler, request, sites, volume, exact, cloud, gap);
+    spacing =
+        fill_between(prepared, sampler, request, sites, volume, exact, device.get(), cloud, gap);
   }
   found.on_surface = static_cast<Index>(sites.position.size());
   report_tally(prepared, tally, found);

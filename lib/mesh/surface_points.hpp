@@ -6,15 +6,10 @@
 
 #include "bulk.hpp"
 #include "mesh/spacing_field.hpp"
+#include "mesh/triangle.hpp"
 #include "phyxel/cloud.hpp"
 
 namespace phyxel {
-
-/// A point on a vertex, an edge or a triangle, with the index of that piece.
-struct PointOn {
-  std::size_t piece;
-  Vec3d point;
-};
 
 /// The area of a triangle, along its normal [m²].
 Vec3d area_of(const Surface& surface, Index triangle);

@@ -182,14 +182,15 @@ void add_along_edges(std::vector<Vec3d>& site, const std::vector<Crease>& crease
 /// Adds sites at random points of faces outside the margin and relaxes them; the sites of the
 /// argument stay.
 void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, const SpacingField& spacing,
-                  const CutMargin& margin, std::uint64_t seed, int relaxations, Stage& stage) {
+                  const CutMargin& margin, std::uint64_t seed, int relaxations, Stage& stage,
+                  const SurfaceOnDevice* device) {
   const std::size_t fixed = site.size();
   const Bulk<PointOn> sample = points_over(surface, spacing, samples_on_faces, seed);
   {
     const Phase phase("darts on the surface");
     const auto add = [&](std::span<const PointOn> free) {
       const std::vector<Vec3d> more = fill_with_darts(blocks_of(free, spacing.coarsest()), spacing,
-                                                      gap_on_faces, seed + 1, site);
+                                                      gap_on_faces, seed + 1, site, device);
       site.insert(site.end(), more.begin(), more.end());
     };
     if (margin.is_empty()) {
@@ -200,7 +201,7 @@ void add_on_faces(const Surface& surface, std::vector<Vec3d>& site, const Spacin
   }
   const Phase phase("evening out the surface");
   relax_on_faces(surface, sample, site, fixed, spacing, margin, repulsion_sweeps(relaxations),
-                 stage);
+                 stage, device);
 }
 
 /// Moves the sites from `first` on, which lie on the boundaries of regions, into these by `depth`
@@ -327,7 +328,7 @@ std::vector<Vec3d> corners_of(const Features& features, const SpacingField& spac
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
                       const SpacingField& wanted, const InsideSampler& sampler,
                       std::span<const SpaceRegion> regions, Index phyxels, std::uint64_t seed,
-                      int relaxations, Stage& stage) {
+                      int relaxations, Stage& stage, const SurfaceOnDevice* device) {
   const double area = sampler.area();
   const Features features = features_of(surface, topology);
   const double rounding =
@@ -353,7 +354,7 @@ SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, d
     add_crossings(found, features.creases, seed);
     add_along_edges(found.position, features.creases, s, margin, seed, relaxations);
     add_along_cuts(faces, sampler, found, seed + 2, relaxations);
-    add_on_faces(surface, found.position, s, margin, seed + 1, relaxations, stage);
+    add_on_faces(surface, found.position, s, margin, seed + 1, relaxations, stage, device);
     // At least a quarter of the phyxels of a lattice without surface must remain for the inside.
     const double inside = static_cast<double>(phyxels) - static_cast<double>(found.position.size());
     const double least_inside = s.is_uniform() ? 0.25 * volume / std::pow(s.coarsest(), 3)

@@ -17,6 +17,8 @@ class Stage;
 
 /// Sites on a surface and on cuts through its inside, with about the spacing of the phyxels that
 /// will fill the rest.
+class SurfaceOnDevice;
+
 struct SurfaceSites {
   std::vector<Vec3d> position;  ///< Sites on the surface [m].
   std::vector<Vec3d> on_cuts;   ///< Sites on cuts, inside the surface [m].
@@ -38,12 +40,12 @@ struct SurfaceSites {
 /// @param volume enclosed volume [m³]
 /// @param spacing the wanted one; the one found may be coarser
 /// @param phyxels total number of phyxels, some of which are left for the inside
-/// @param stage is told the progress
+/// @param stage is told the progress. @param device helps, or null
 /// @throws InputError if there are so few phyxels that those on opposite sides would be nearer to
 ///   each other than those side by side
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,
                       const SpacingField& spacing, const InsideSampler& sampler,
                       std::span<const SpaceRegion> cuts, Index phyxels, std::uint64_t seed,
-                      int relaxations, Stage& stage);
+                      int relaxations, Stage& stage, const SurfaceOnDevice* device);
 
 }  // namespace phyxel

@@ -3,24 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <utility>
 
-#include "mesh/face_relaxation.hpp"
 #include "model/box.hpp"
 
 namespace phyxel {
 namespace {
 
 constexpr Index largest_leaf = 8;
-
-/// Half the solid angle of the triangle (a, b, c) seen from the origin. On the triangle's plane
-/// the sign is undecided; seen from its own corner the angle counts as zero.
-double half_solid_angle(Vec3d a, Vec3d b, Vec3d c) {
-  const double la = norm(a), lb = norm(b), lc = norm(c);
-  const double numerator = dot(a, cross(b, c));
-  const double denominator = la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb;
-  return numerator == 0 ? 0 : std::atan2(numerator, denominator);
-}
 
 }  // namespace
 
@@ -31,15 +20,6 @@ double direct_winding_number(const std::vector<Vec3d>& position,
     sum += half_solid_angle(position[t[0]] - point, position[t[1]] - point, position[t[2]] - point);
   }
   return sum / (2 * std::numbers::pi);
-}
-
-double WindingNumber::Bounds::squared_distance(Vec3d x) const {
-  const auto beyond = [](double at, double least, double most) {
-    return std::max({least - at, at - most, 0.0});
-  };
-  const Vec3d way{beyond(x.x, low.x, high.x), beyond(x.y, low.y, high.y),
-                  beyond(x.z, low.z, high.z)};
-  return dot(way, way);
 }
 
 WindingNumber::WindingNumber(const Surface& surface, double accuracy) : accuracy_(accuracy) {
@@ -56,7 +36,7 @@ WindingNumber::WindingNumber(const Surface& surface, double accuracy) : accuracy
 }
 
 void WindingNumber::build(Index index) {
-  Node node = nodes_[index];
+  WindingNode node = nodes_[index];
   const auto first = corners_.begin() + node.first, last = first + node.count;
 
   double total = 0;
@@ -84,7 +64,7 @@ void WindingNumber::build(Index index) {
   std::vector<Vec3d> points;
   for (auto t = first; t != last; ++t) points.insert(points.end(), {t->a, t->b, t->c});
   const Box box = box_around(points);
-  bounds_.push_back({box.low, box.high});  // nodes are built in their order
+  boxes_.push_back({box.low, box.high});  // nodes are built in their order
 
   if (node.count > largest_leaf) {
     const Vec3d extent = high - low;
@@ -99,7 +79,7 @@ void WindingNumber::build(Index index) {
     std::nth_element(first, first + half, last,
                      [&](const Corners& s, const Corners& t) { return along(s) < along(t); });
     node.child = static_cast<Index>(nodes_.size());
-    Node left, right;
+    WindingNode left, right;
     left.first = node.first;
     left.count = half;
     right.first = node.first + half;
@@ -113,74 +93,15 @@ void WindingNumber::build(Index index) {
 double WindingNumber::operator()(Vec3d point, Offset* work) const {
   if (nodes_.empty()) return 0;
   Offset done = 0;
-  double near = 0, far = 0;  // in units of half solid angles and of solid angles
-  Index stack[64];
-  int depth = 0;
-  stack[depth++] = 0;
-  while (depth > 0) {
-    const Node& node = nodes_[stack[--depth]];
-    ++done;
-    const Vec3d r = node.centre - point;
-    const double r2 = dot(r, r);
-    if (r2 > node.radius * node.radius) {
-      // With G(r) = r / |r|^3: area . G + moment : grad G.
-      const double inverse2 = 1 / r2, inverse3 = inverse2 / std::sqrt(r2);
-      const Mat3d& m = node.moment;
-      far += inverse3 *
-             (dot(node.area, r) + m(0, 0) + m(1, 1) + m(2, 2) - 3 * inverse2 * dot(r, m * r));
-    } else if (node.child >= 0) {
-      stack[depth++] = node.child + 1;
-      stack[depth++] = node.child;
-    } else {
-      done += angle_work * node.count;
-      for (Index t = node.first; t < node.first + node.count; ++t) {
-        const Corners& c = corners_[t];
-        near += half_solid_angle(c.a - point, c.b - point, c.c - point);
-      }
-    }
-  }
+  const double found = view().winding(point, done);
   if (work) *work += done;
-  return near / (2 * std::numbers::pi) + far / (4 * std::numbers::pi);
+  return found;
 }
 
-double WindingNumber::distance(Vec3d point, double most, Index* nearest_triangle) const {
+double WindingNumber::distance(Vec3d point, double most, Index* nearest) const {
   if (nodes_.empty()) return most;
-  double nearest = most;
   Index unused = -1;
-  Index& at = nearest_triangle ? *nearest_triangle : unused;
-  const auto look = [&](Index t) {
-    const Corners& c = corners_[t];
-    const double found = norm(nearest_on_triangle(point, c.a, c.b, c.c) - point);
-    if (!(found < nearest)) return;
-    nearest = found;
-    at = t;
-  };
-  if (at >= 0) look(at);
-  /// A node to visit, and the least squared distance of its triangles.
-  struct Waiting {
-    Index node;
-    double least;
-  };
-  const auto waiting = [&](Index index) {
-    return Waiting{index, bounds_[static_cast<std::size_t>(index)].squared_distance(point)};
-  };
-  Waiting stack[64];
-  int depth = 0;
-  stack[depth++] = waiting(0);
-  while (depth > 0) {
-    const Waiting next = stack[--depth];
-    if (next.least >= nearest * nearest) continue;
-    const Node& node = nodes_[next.node];
-    if (node.child >= 0) {
-      Waiting near = waiting(node.child), far = waiting(node.child + 1);
-      if (far.least < near.least) std::swap(near, far);
-      stack[depth++] = far;
-      stack[depth++] = near;
-      continue;
-    }
-    for (Index t = node.first; t < node.first + node.count; ++t) look(t);
-  }
-  return nearest;
+  return view().distance(point, most, nearest ? *nearest : unused);
 }
 
 }  // namespace phyxel

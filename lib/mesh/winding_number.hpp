@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "mesh/winding_view.hpp"
 #include "phyxel/cloud.hpp"
 
 namespace phyxel {
@@ -24,42 +25,28 @@ class WindingNumber {
   ///   to the other side of a closed surface; it falls with the square of the accuracy.
   explicit WindingNumber(const Surface& surface, double accuracy = 2.5);
 
-  /// @param work if given, is raised by one for each group and by `angle_work` for each triangle
+  /// @param work if given, is raised by one for each group and by `WindingView::angle_work` for
+  /// each
+  ///   triangle
   ///   visited
   double operator()(Vec3d point, Offset* work = nullptr) const;
   /// The distance from a point to the nearest triangle [m], or `most` where it is larger.
   /// @param nearest if given, is a triangle likely to be near, or -1, and receives the nearest one;
   ///   the distance is the same for any
   double distance(Vec3d point, double most, Index* nearest = nullptr) const;
-  static constexpr Offset angle_work = 8;  ///< Cost of a solid angle, in expansions of groups.
+  /// The tree of the triangles, as long as this lives; it needs one triangle at least.
+  WindingView view() const { return {corners_.data(), nodes_.data(), boxes_.data()}; }
+  std::span<const Corners> corners() const { return corners_; }
+  std::span<const WindingNode> nodes() const { return nodes_; }
+  std::span<const TriangleBox> boxes() const { return boxes_; }
 
  private:
-  struct Corners {
-    Vec3d a, b, c;
-  };
-  /// The box around the triangles of a node [m].
-  struct Bounds {
-    Vec3d low, high;
-    /// The squared distance of a point, 0 inside [m²].
-    double squared_distance(Vec3d x) const;
-  };
-  /// A node of the tree of triangles. Its two children are adjacent; a leaf has none.
-  struct Node {
-    Vec3d centre;  ///< Area-weighted [m].
-    /// Radius about the centre of a ball that contains the triangles, times `accuracy` [m].
-    double radius = 0;
-    Vec3d area;                  ///< Sum of the triangles' area vectors [m^2].
-    Mat3d moment;                ///< Sum of (centroid - centre) (area vector)^T [m^3].
-    Index first = 0, count = 0;  ///< Range of triangles.
-    Index child = -1;            ///< First child; -1 for a leaf.
-  };
-
   void build(Index node);
 
   double accuracy_;
   std::vector<Corners> corners_;
-  std::vector<Node> nodes_;
-  std::vector<Bounds> bounds_;  // of each node
+  std::vector<WindingNode> nodes_;
+  std::vector<TriangleBox> boxes_;  // of each node
 };
 
 }  // namespace phyxel

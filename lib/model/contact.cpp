@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "mesh/distance_field.hpp"
-#include "mesh/face_relaxation.hpp"
+#include "mesh/triangle.hpp"
 #include "model/assembly.hpp"
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"

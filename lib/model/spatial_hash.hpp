@@ -1,19 +1,18 @@
 /// The spatial hash of Teschner et al. 2003 on the CPU.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <span>
 
 #include "bulk.hpp"
-#include "model/cell_grid.hpp"
+#include "model/cell_search.hpp"
 
 namespace phyxel {
 
 /// Points in the buckets of a hash table, by the grid cell they lie in. Building it and visiting
 /// the points near a place are linear in the number of points; the extent of the cloud, and holes
 /// in it, cost nothing.
-class SpatialHash {
+class SpatialHash : public CellSearch<SpatialHash> {
  public:
   /// A point as the table holds it: bucket by bucket, so that a visit reads memory in order.
   struct Entry {
@@ -25,6 +24,9 @@ class SpatialHash {
   SpatialHash(std::span<const Vec3d> position, double cell_size);
 
   double cell_size() const { return cell_size_; }
+  const CellGrid& grid() const { return grid_; }
+  Vec3d high() const { return high_; }  ///< The upper corner of the points' box [m].
+  std::size_t points() const { return entries_.size(); }
   /// Mean number of points in a cell that holds any.
   double mean_occupancy() const { return mean_occupancy_; }
 
@@ -33,133 +35,9 @@ class SpatialHash {
   void visit_all(Visit&& visit) const {
     for (const Entry& entry : entries_) visit(entry);
   }
-
-  /// Calls visit(entry) once for (at least) every point nearer to `place` than `rings` cells. Where
-  /// that would be more cells than there are points, it visits the points.
+  /// The same for the points of a cell.
   template <class Visit>
-  void visit_near(Vec3d place, int rings, Visit&& visit) const {
-    const double width = 2.0 * rings + 1;
-    if (rings > 3 && width * width * width > static_cast<double>(entries_.size())) {
-      visit_all(visit);
-      return;
-    }
-    const Cell c = grid_.cell_of(place);
-    for (std::int64_t z = c.z - rings; z <= c.z + rings; ++z) {
-      for (std::int64_t y = c.y - rings; y <= c.y + rings; ++y) {
-        for (std::int64_t x = c.x - rings; x <= c.x + rings; ++x) visit_cell({x, y, z}, visit);
-      }
-    }
-  }
-
-  /// Calls visit(entry) once for every point within `radius` [m] of `place`, and for others in
-  /// cells that the ball cuts, in the order of `visit_near`.
-  template <class Visit>
-  void visit_ball(Vec3d place, double radius, Visit&& visit) const {
-    const auto rings = static_cast<int>(std::ceil(radius / cell_size_));
-    if (rings > 3) {
-      visit_near(place, rings, visit);
-      return;
-    }
-    const Cell c = grid_.cell_of(place);
-    const Vec3d within = within_cell(place, c);
-    const double most = radius * grid_.inverse_cell_size * (1 + 1e-6) + 1e-6;
-    for (std::int64_t z = -rings; z <= rings; ++z) {
-      const double z2 = gap2(z, within.z);
-      if (z2 > most * most) continue;
-      for (std::int64_t y = -rings; y <= rings; ++y) {
-        const double yz2 = z2 + gap2(y, within.y);
-        if (yz2 > most * most) continue;
-        for (std::int64_t x = -rings; x <= rings; ++x) {
-          if (yz2 + gap2(x, within.x) > most * most) continue;
-          visit_cell({c.x + x, c.y + y, c.z + z}, visit);
-        }
-      }
-    }
-  }
-
-  /// The same for the cells exactly `ring` cells away.
-  template <class Visit>
-  void visit_ring(Vec3d place, int ring, Visit&& visit) const {
-    visit_ring(place, ring, HUGE_VAL, visit);
-  }
-
-  /// The point of the table nearest to a place.
-  struct Nearest {
-    Vec3d apart;                  ///< The vector from the place to the point [m].
-    double distance2 = HUGE_VAL;  ///< [m^2]
-    Index index = -1;             ///< -1 if no point was found.
-  };
-
-  /// Finds the point nearest to `place` but for the one with the index `except`. Of points at the
-  /// same distance, the first visited is found. Points beyond `limit` [m] may be left out.
-  Nearest nearest(Vec3d place, double limit = HUGE_VAL, Index except = -1) const {
-    Nearest found;
-    const auto compare = [&](const Entry& entry) {
-      if (entry.index == except) return;
-      const Vec3d d = entry.position - place;
-      const double distance2 = dot(d, d);
-      if (distance2 >= found.distance2) return;
-      found = {d, distance2, entry.index};
-    };
-    const int farthest = farthest_ring(place);
-    for (int ring = 0; ring <= farthest && (ring - 1) * cell_size_ <= limit; ++ring) {
-      if (ring > 4 && limit == HUGE_VAL) {  // rare: the place is far from every point
-        visit_all(compare);
-        break;
-      }
-      visit_ring(place, ring, found.distance2, compare);
-      // After rings 0 to r, each point nearer than r cells has been visited.
-      if (found.distance2 <= ring * cell_size_ * ring * cell_size_) break;
-    }
-    return found;
-  }
-
-  /// Rings of cells around `place` beyond which there is no point.
-  int farthest_ring(Vec3d place) const { return grid_.farthest_ring(place, high_); }
-
- private:
-  using Cell = CellGrid::Cell;
-
-  /// A place from the corner of its cell, in cells.
-  Vec3d within_cell(Vec3d place, Cell c) const {
-    return grid_.inverse_cell_size * (place - grid_.low) -
-           Vec3d{double(c.x), double(c.y), double(c.z)};
-  }
-  /// The square of the distance along one axis from a place to the cell d cells away, in cells.
-  /// @param at the place within its cell, in cells
-  static double gap2(std::int64_t d, double at) {
-    const double gap = d > 0   ? static_cast<double>(d) - at
-                       : d < 0 ? at - static_cast<double>(d + 1)
-                               : 0;
-    return gap * gap;
-  }
-
-  /// Visits the points of the cells exactly `ring` cells away, but for cells that are farther away
-  /// than the root of `limit2` [m²], which a visit may make smaller.
-  template <class Visit>
-  void visit_ring(Vec3d place, int ring, const double& limit2, Visit&& visit) const {
-    const Cell c = grid_.cell_of(place);
-    const Vec3d within = within_cell(place, c);
-    const double cells2 = grid_.inverse_cell_size * grid_.inverse_cell_size * (1 + 1e-6);
-    const auto is_beyond = [&](double gaps2) { return gaps2 > limit2 * cells2 + 1e-6; };
-    for (std::int64_t dz = -ring; dz <= ring; ++dz) {
-      const double z2 = gap2(dz, within.z);
-      if (is_beyond(z2)) continue;
-      for (std::int64_t dy = -ring; dy <= ring; ++dy) {
-        const double yz2 = z2 + gap2(dy, within.y);
-        if (is_beyond(yz2)) continue;
-        const bool face = std::abs(dz) == ring || std::abs(dy) == ring;
-        const std::int64_t stride = face || ring == 0 ? 1 : 2 * ring;
-        for (std::int64_t dx = -ring; dx <= ring; dx += stride) {
-          if (is_beyond(yz2 + gap2(dx, within.x))) continue;
-          visit_cell({c.x + dx, c.y + dy, c.z + dz}, visit);
-        }
-      }
-    }
-  }
-
-  template <class Visit>
-  void visit_cell(Cell c, Visit&& visit) const {
+  void visit_cell(CellGrid::Cell c, Visit&& visit) const {
     const std::uint64_t cell = CellGrid::name(c);
     const std::size_t bucket = grid_.bucket_of(cell);
     for (std::uint32_t k = bucket_start_[bucket]; k < bucket_start_[bucket + 1]; ++k) {
@@ -167,6 +45,7 @@ class SpatialHash {
     }
   }
 
+ private:
   CellGrid grid_;
   Vec3d high_;
   double cell_size_ = 1, mean_occupancy_ = 0;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "mesh/filling_device.hpp"
 #include "model/assembly.hpp"
 #include "model/device_setup.hpp"
 #include "mpi/communicator.hpp"
@@ -11,6 +12,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/ranks.hpp"
 #include "setup/closing.hpp"
+#include "setup/filling.hpp"
 #include "setup/survey.hpp"
 #include "solver/cuda_backend.hpp"
 #include "stage.hpp"
@@ -51,6 +53,11 @@ DeviceSetup setup_by(const ChosenDevice& device, bool surveys) {
   return setup;
 }
 
+/// What helps to fill surfaces; null for the CPU.
+std::shared_ptr<const FillingDevice> filling_device(const ChosenDevice& device) {
+  return device.gpu ? cuda_filling_device(device.gpu->index) : nullptr;
+}
+
 }  // namespace
 
 void check_device_name(const std::string& name, const std::string& where) {
@@ -85,7 +92,20 @@ ChosenDevice choose_device(const Ranks& ranks, const std::string& name, const st
   return chosen;
 }
 
+Cloud sample_surface(const Surface& surface, const SampleRequest& request,
+                     const ChosenDevice& device, SampleReport* report) {
+  const FillingScope filling(filling_device(device));
+  return sample_surface(surface, request, report);
+}
+
+std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named,
+                               const ChosenDevice& device) {
+  const FillingScope filling(filling_device(device));
+  return make_clouds(scene, named);
+}
+
 Model build_model(const Scene& scene, const ChosenDevice& device) {
+  const FillingScope filling(filling_device(device));
   return build_model(scene, setup_by(device, surveys(device, scene)));
 }
 

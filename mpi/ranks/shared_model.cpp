@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "mesh/filling_device.hpp"
 #include "mpi/build_share.hpp"
 #include "mpi/communicator.hpp"
 #include "mpi/row_redistribution.hpp"
@@ -9,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/ranks.hpp"
 #include "setup/closing.hpp"
+#include "setup/filling.hpp"
 #include "setup/survey.hpp"
 #include "setup/tiling.hpp"
 
@@ -89,6 +91,7 @@ void SharedModel::build(const Scene& scene, const std::vector<Cloud>* clouds,
     options.surveyor = surveyor.get();
     options.close = cuda_closing_search(device_.gpu->index);
   }
+  const FillingScope filling(device_.gpu ? cuda_filling_device(device_.gpu->index) : nullptr);
   const MpiCommunicator& all = ranks_.communicator();
   BuiltShare built =
       clouds ? build_share(all, scene, *clouds, options) : build_share(all, scene, options);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "phyxel/backend.hpp"
+#include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"
 
 namespace phyxel {
@@ -45,6 +47,15 @@ ChosenDevice choose_device(const std::string& name, const std::string& where = "
 /// "auto" chooses GPUs only if all ranks find one. Collective. @throws Error as above, on each rank
 ChosenDevice choose_device(const Ranks& ranks, const std::string& name,
                            const std::string& where = "device");
+
+/// Fills a surface as `sample_surface` without a device does, to the last bit, with the help of a
+/// device. @throws InputError likewise, and DeviceError
+Cloud sample_surface(const Surface& surface, const SampleRequest& request,
+                     const ChosenDevice& device, SampleReport* report = nullptr);
+
+/// Makes the clouds of a scene as `make_clouds` without a device does, likewise.
+std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named,
+                               const ChosenDevice& device);
 
 /// Builds the model of a scene, with a neighbour search on the device that will step it; the host
 /// may then have no neighbour lists.

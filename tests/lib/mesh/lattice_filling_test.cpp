@@ -6,9 +6,9 @@
 #include <cmath>
 #include <random>
 
-#include "mesh/face_relaxation.hpp"
 #include "mesh/inside_samples.hpp"
 #include "mesh/repulsion.hpp"
+#include "mesh/triangle.hpp"
 #include "mesh/winding_number.hpp"
 #include "model/assembly.hpp"
 #include "phyxel/mesh.hpp"

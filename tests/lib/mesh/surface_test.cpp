@@ -5,8 +5,8 @@
 #include <numbers>
 #include <random>
 
-#include "mesh/face_relaxation.hpp"
 #include "mesh/inside_samples.hpp"
+#include "mesh/triangle.hpp"
 #include "mesh/winding_number.hpp"
 #include "phyxel/mesh.hpp"
 #include "support/surfaces.hpp"
@@ -61,7 +61,7 @@ TEST(InsideSampler, TellsWhichStepsStayInside) {
   int stayed = 0, left = 0;
   for (int point = 0; point < 20; ++point) {
     Vec3d at = random_point(engine, 0.05, 0.95);
-    InsideSampler::Ball ball;
+    ClearBall ball;
     for (int step = 0; step < 200; ++step) {
       const Vec3d after = at + random_point(engine, -0.1, 0.1);
       const double low = std::min({after.x, after.y, after.z}),
