@@ -1,4 +1,5 @@
 """docs/results/README.md, the speed on CPUs, and the table of speeds in README.md."""
+from pages import sampling
 from pages.page import Page
 from pages.tables import PageError, markdown_table, read_if_there
 
@@ -65,21 +66,9 @@ def neighbours_section(page, table):
 def sample_section(page, results):
     """Adds how fast a mesh is filled with phyxels."""
     tables = [table for table in (read_if_there(results / f"cpu_sample{more}.csv") for more in ("", "_16")) if table]
-    if not tables:
-        return
-    page.paragraph("## Filling a mesh with phyxels")
-    page.paragraph("`phyxel bench sample`. Seconds, of the whole and of its stages; bytes are the most memory in use at a "
-                   "time, with the cloud itself. The smallest gap between two phyxels is relative to the mean distance to "
-                   "the nearest; *uneven*: the relative standard deviation of that distance.")
-    stages = ["surface_s", "place_s", "relax_s", "volumes_s"]
-    for table in tables:
-        page.paragraph(f"{measured(table)}:")
-        page.add(markdown_table(
-            ["mesh", "triangles", "threads", "phyxels", "on the surface", "phyxels/s", "s", "surface", "lattice", "evening out",
-             "volumes", "bytes/phyxel", "smallest gap", "uneven"],
-            [[row["mesh"], row["triangles"], row["threads"], row["phyxels"], row["on_surface"],
-              f"{row.number('phyxels_per_s'):,.0f}", row["seconds"], *(row[stage] for stage in stages),
-              row["bytes_per_phyxel"], row["smallest_gap"], f"{row.number('gap_spread'):.1%}"] for row in table.rows]))
+    if tables:
+        page.paragraph("## Filling a mesh with phyxels")
+        sampling.add_tables(page, tables, measured)
 
 
 def peer_rows(peer, own):

@@ -1,12 +1,21 @@
-"""The section on the largest bodies filled from a mesh, from the summaries of their runs."""
+"""The sections on filling meshes on a GPU, and on the largest bodies, from the summaries of their runs."""
 
 import json
 
-from pages.tables import markdown_table
+from pages import sampling
+from pages.page import measured_by
+from pages.tables import markdown_table, read_if_there
 
 
 def add(page, results):
-    """Adds the section, if there are summaries."""
+    """Adds how fast a GPU fills meshes, and the section on the largest bodies, as far as there are measurements."""
+    filling = read_if_there(results / "gpu_sample.csv")
+    if filling:
+        page.paragraph("## Filling a mesh with phyxels on a GPU")
+        page.paragraph("The host divides space into regions and inspects the surface; the GPU chooses and evens out the "
+                       "phyxels on the surface, places and moves those inside, and finds their volumes. Clouds have the bits "
+                       "of the host's. What a host takes alone: [results](results/README.md).")
+        sampling.add_tables(page, [filling], lambda table: measured_by(table, "gpu"))
     files = sorted(results.glob("gpu_mesh_*.json"), key=lambda file: json.loads(file.read_text())["phyxels"])
     if not files:
         return
@@ -20,7 +29,7 @@ def add(page, results):
                       f"{run['steps_per_second']:.4g}", f"{run['phyxel_steps_per_second'] * 1e-9:.3g}",
                       f"{run['bytes'] / run['phyxels']:.0f}", f"{run['energy_drift']:.1e}"])
     page.paragraph("Summaries (`run.json`) of runs of `cheburashka.obj`, free and turning, in float, on one GPU and 16 cores. "
-                   "*Model*: sampling on the CPU, neighbours and, where gradients are closed, closing on the GPU. "
+                   "*Model*: filling, neighbours and, where gradients are closed, closing on the GPU. "
                    "*Energy drift*: relative, over the 200 steps of each run.")
     page.add(markdown_table(["phyxels", "closure", "GPU", "commit", "model [s]", "backend and step limit [s]", "steps/s",
                              "10⁹ phyxel-steps/s", "bytes per phyxel on the GPU", "energy drift"], cells))
