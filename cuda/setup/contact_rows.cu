@@ -13,7 +13,7 @@ struct Near {
   LayerView layer;
   HashView hash;
   const ContactCandidate* points;
-  const Index* body;  ///< Of each candidate.
+  const Index* body;  ///< The body of each candidate.
   double reach;
 
   /// Calls visit(k) for each candidate in the lists of a point.
@@ -43,7 +43,7 @@ struct FindEntries {
   std::uint64_t points;
   std::uint64_t* keys;  ///< Receives as many entries as there is room for.
   std::uint64_t room;
-  unsigned long long* count;  ///< Of all entries.
+  unsigned long long* count;  ///< Receives the number of all entries.
 
   __device__ void operator()(std::int64_t p) const {
     constexpr int most = 32;
@@ -106,8 +106,8 @@ Entries entries_of(DeviceArray<std::uint64_t> keys, const Candidates& points,
 
 /// Rows of entries before they are divided into patches. Arrays have room for a row per entry.
 struct WholeRows {
-  Numbers row;                ///< Of each entry.
-  DeviceArray<Offset> start;  ///< Entries of each row, and the end of the last one.
+  Numbers row;                ///< The row of each entry.
+  DeviceArray<Offset> start;  ///< The first entry of each row, and the end of the last row.
   DeviceArray<char> divided;  ///< 1 for rows of points beside several patches, else 0.
 };
 
@@ -244,7 +244,7 @@ DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerVi
   const double reach = extent.range + layer.skin;
   const DeviceHash hash(now, extent.box, reach);
   const Near near{layer, hash.view(), points.data(), body.data(), reach};
-  if (room == 0) room = 16 * n;
+  if (room == 0) room = n;
   DeviceArray<std::uint64_t> keys;
   for (bool had_room = false; !had_room;) {
     keys = {};

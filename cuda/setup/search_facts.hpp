@@ -17,8 +17,8 @@ struct Extent {
 /// Numbers of a search, zero as it begins.
 struct SearchFacts {
   std::int64_t candidates = 0;
-  Extent extent;  ///< Of the candidates.
-  unsigned long long entries = 0;
+  Extent extent;                   ///< The extent of the candidates.
+  unsigned long long entries = 0;  ///< Entries found, with or without room for them.
   // Of rows:
   std::int64_t rows = 0;            ///< Rows before they are divided into patches.
   unsigned long long divided = 0;   ///< Rows that are divided.
