@@ -58,11 +58,12 @@ class MemoryPool {
   cudaStream_t stream() const { return stream_; }
   /// Allocates as `detail::allocate`.
   void* take(std::size_t bytes, const std::string& what);
-  void give_back(void* data) noexcept;
+  void give_back(void* data) noexcept;  ///< `data` must not be null.
   /// Counts a round of the work, and frees the blocks that no array has used for many rounds.
   void begin_round();
-  /// Number of blocks that no array uses.
+  /// Number and size of the blocks that no array uses.
   std::size_t idle_blocks() const;
+  std::size_t idle_bytes() const;
 
  private:
   struct Block {
@@ -115,6 +116,7 @@ class DeviceArray {
     return *this;
   }
   ~DeviceArray() {
+    if (!data_) return;
     if (pool_) {
       pool_->give_back(data_);
     } else {

@@ -260,7 +260,6 @@ void* MemoryPool::take(std::size_t bytes, const std::string& what) {
 }
 
 void MemoryPool::give_back(void* data) noexcept {
-  if (!data) return;
   const auto block = in_arrays_.find(data);
   idle_[block->second].push_back({data, round_});
   in_arrays_.erase(block);
@@ -275,6 +274,12 @@ std::size_t MemoryPool::idle_blocks() const {
   std::size_t count = 0;
   for (const auto& [size, blocks] : idle_) count += blocks.size();
   return count;
+}
+
+std::size_t MemoryPool::idle_bytes() const {
+  std::size_t bytes = 0;
+  for (const auto& [size, blocks] : idle_) bytes += size * blocks.size();
+  return bytes;
 }
 
 // Blocks are taken from the back of a list, so that those at its front have been idle for long.

@@ -374,7 +374,8 @@ DeviceArray<double> DeviceTouchingPoints::regains(double dt) {
 
 std::size_t DeviceTouchingPoints::bytes() const {
   const auto sum = [](const auto&... arrays) { return (arrays.bytes() + ...); };
-  return sum(own_.layer, own_.place, own_.tiles, own_.entry, own_.body, own_.position, own_.centre,
+  return pool_->idle_bytes() +
+         sum(own_.layer, own_.place, own_.tiles, own_.entry, own_.body, own_.position, own_.centre,
              lists_.site, lists_.id, lists_.rows, lists_.near, lists_.rows_naming,
              lists_.entries_of, lists_.rows_from, lists_.near_start, lists_.entries_of_start,
              lists_.rows_from_start, site_, gain_, modulus_, regain_, place_, id_, body_, rest_,

@@ -57,6 +57,7 @@ TEST_F(PooledArrays, GetTheMemoryOfEarlierOnes) {
     EXPECT_EQ(pool.idle_blocks(), 0u);
   }
   EXPECT_EQ(pool.idle_blocks(), 1u);
+  EXPECT_GE(pool.idle_bytes(), 1000 * sizeof(int));
   DeviceArray<int> again(990, "numbers of about the same size"), more(990, "more numbers");
   EXPECT_EQ(again.data(), first);
   EXPECT_NE(more.data(), first);
