@@ -1,4 +1,6 @@
-/// Devices and the errors of CUDA calls.
+/// Devices, their memory, and the errors of CUDA calls.
+#include <algorithm>
+#include <bit>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -196,9 +198,7 @@ namespace detail {
 void* allocate(std::size_t bytes, const std::string& what) {
   if (bytes == 0) return nullptr;
   void* data = nullptr;
-  const bool pooled = PooledMemory::is_used();
-  const cudaError_t error =
-      pooled ? cudaMallocAsync(&data, bytes, cudaStreamLegacy) : cudaMalloc(&data, bytes);
+  const cudaError_t error = cudaMalloc(&data, bytes);
   if (error == cudaErrorMemoryAllocation) {
     cudaGetLastError();
     std::size_t free = 0, total = 0;
@@ -207,50 +207,96 @@ void* allocate(std::size_t bytes, const std::string& what) {
                       gigabytes(bytes) + ", " + gigabytes(free) + " of " + gigabytes(total) +
                       " are free");
   }
-  check_cuda(error, pooled ? "cudaMallocAsync" : "cudaMalloc");
+  check_cuda(error, "cudaMalloc");
   return data;
 }
 
-void release(void* data, bool pooled) {
-  if (pooled && data) {
-    cudaFreeAsync(data, cudaStreamLegacy);
-  } else {
-    cudaFree(data);
+void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind) {
+  const cudaStream_t stream = work_stream();
+  if (!stream) {
+    PHYXEL_CUDA(cudaMemcpy(to, from, bytes, kind));
+    return;
   }
+  PHYXEL_CUDA(cudaMemcpyAsync(to, from, bytes, kind, stream));
+  PHYXEL_CUDA(cudaStreamSynchronize(stream));
 }
 
 }  // namespace detail
 
 namespace {
-thread_local int pools = 0;  // `PooledMemory` in use
+
+thread_local MemoryPool* pool_in_use = nullptr;
+
+/// The size of a block for an array: one of four in each octave, so that arrays whose sizes differ
+/// a little from round to round get the same blocks.
+std::size_t block_size(std::size_t bytes) {
+  constexpr std::size_t least = 512;
+  if (bytes <= least) return least;
+  const std::size_t quarter = std::bit_ceil(bytes) / 8;
+  return (bytes + quarter - 1) / quarter * quarter;
 }
 
-PooledMemory::PooledMemory() {
-  int device = 0, has_pools = 0;
-  PHYXEL_CUDA(cudaGetDevice(&device));
-  PHYXEL_CUDA(cudaDeviceGetAttribute(&has_pools, cudaDevAttrMemoryPoolsSupported, device));
-  is_here_ = has_pools != 0;
-  if (!is_here_) return;
-  cudaMemPool_t pool = nullptr;
-  std::uint64_t kept = UINT64_MAX;
-  PHYXEL_CUDA(cudaDeviceGetDefaultMemPool(&pool, device));
-  PHYXEL_CUDA(cudaMemPoolSetAttribute(pool, cudaMemPoolAttrReleaseThreshold, &kept));
-  ++pools;
-}
+}  // namespace
 
-PooledMemory::~PooledMemory() { pools -= is_here_ ? 1 : 0; }
+MemoryPool::~MemoryPool() { free_blocks_before(round_ + 1); }
 
-bool PooledMemory::is_used() { return pools > 0; }
-
-void PooledMemory::give_back() noexcept {
-  int device = 0;
-  cudaMemPool_t pool = nullptr;
-  if (cudaGetDevice(&device) != cudaSuccess ||
-      cudaDeviceGetDefaultMemPool(&pool, device) != cudaSuccess) {
-    return;  // a device without pools keeps nothing
+void* MemoryPool::take(std::size_t bytes, const std::string& what) {
+  if (bytes == 0) return nullptr;
+  const std::size_t size = block_size(bytes);
+  void* data = nullptr;
+  if (std::vector<Block>& blocks = idle_[size]; !blocks.empty()) {
+    data = blocks.back().data;
+    blocks.pop_back();
+  } else {
+    try {
+      data = detail::allocate(size, what);
+    } catch (const DeviceError&) {
+      free_blocks_before(round_ + 1);
+      data = detail::allocate(size, what);
+    }
   }
-  cudaDeviceSynchronize();
-  cudaMemPoolTrimTo(pool, 0);
+  in_arrays_[data] = size;
+  return data;
 }
+
+void MemoryPool::give_back(void* data) noexcept {
+  const auto block = in_arrays_.find(data);
+  idle_[block->second].push_back({data, round_});
+  in_arrays_.erase(block);
+}
+
+void MemoryPool::begin_round() {
+  constexpr std::int64_t kept_rounds = 32;
+  free_blocks_before(++round_ - kept_rounds);
+}
+
+std::size_t MemoryPool::idle_blocks() const {
+  std::size_t count = 0;
+  for (const auto& [size, blocks] : idle_) count += blocks.size();
+  return count;
+}
+
+std::size_t MemoryPool::idle_bytes() const {
+  std::size_t bytes = 0;
+  for (const auto& [size, blocks] : idle_) bytes += size * blocks.size();
+  return bytes;
+}
+
+// Blocks are taken from the back of a list, so that those at its front have been idle for long.
+// Freeing waits for the kernels that use a block.
+void MemoryPool::free_blocks_before(std::int64_t round) {
+  for (auto& [size, blocks] : idle_) {
+    const auto end = std::find_if(blocks.begin(), blocks.end(),
+                                  [&](const Block& block) { return block.round >= round; });
+    std::for_each(blocks.begin(), end, [](const Block& block) { cudaFree(block.data); });
+    blocks.erase(blocks.begin(), end);
+  }
+}
+
+PooledMemory::PooledMemory(MemoryPool& pool) : before_(std::exchange(pool_in_use, &pool)) {}
+
+PooledMemory::~PooledMemory() { pool_in_use = before_; }
+
+MemoryPool* PooledMemory::used() { return pool_in_use; }
 
 }  // namespace phyxel

@@ -37,6 +37,13 @@ class Phase {
     if (what_) since_ = std::chrono::steady_clock::now();
   }
   ~Phase() { end(); }
+  /// Begins the next span, where one span follows another.
+  void next(const char* what) {
+    end();
+    if (!Timeline::is_on()) return;
+    what_ = what;
+    since_ = std::chrono::steady_clock::now();
+  }
   void end() {
     if (what_) Timeline::add(std::exchange(what_, nullptr), since_);
   }

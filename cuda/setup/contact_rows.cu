@@ -13,6 +13,7 @@ struct Near {
   LayerView layer;
   HashView hash;
   const ContactCandidate* points;
+  const Index* body;  ///< The body of each candidate.
   double reach;
 
   /// Calls visit(k) for each candidate in the lists of a point.
@@ -20,10 +21,13 @@ struct Near {
   __device__ void each(Index p, Visit&& visit) const {
     const ContactCandidate& point = points[p];
     const Vec3d now = point.now;
+    const bool touches_itself = layer.partner_of(point.body, point.body) >= 0;
     hash.visit_near(0, now, reach, [&](std::uint32_t entry, const Vec3d& there) {
       // Most entries of the cells are too far from any point to be looked at.
       if (const Vec3d way = there - now; dot(way, way) > reach * reach) return;
       const Index k = hash.index[entry];
+      // Most of the others are of the same body.
+      if (body[k] == point.body && !touches_itself) return;
       const ContactCandidate& other = points[k];
       if (!is_near(point, other, layer.skin)) return;
       if (layer.partner_of(point.body, other.body) >= 0) visit(k);
@@ -31,9 +35,48 @@ struct Near {
   }
 };
 
-struct RangeOf {
-  const ContactCandidate* points;
-  __device__ double operator()(std::int64_t p) const { return points[p].site.range; }
+/// Finds the entries of points, in any order, and counts them. Each thread keeps some entries
+/// before it asks for a place in memory, since all threads count with the same number.
+struct FindEntries {
+  Near near;
+  const Index* order;  ///< Place of each candidate in `by_list`.
+  std::uint64_t points;
+  std::uint64_t* keys;  ///< Receives as many entries as there is room for.
+  std::uint64_t room;
+  unsigned long long* count;  ///< Receives the number of all entries.
+
+  __device__ void operator()(std::int64_t p) const {
+    constexpr int most = 32;
+    std::uint64_t some[most];
+    int held = 0;
+    const auto put = [&] {
+      const unsigned long long first = atomicAdd(count, static_cast<unsigned long long>(held));
+      for (int e = 0; e < held; ++e) {
+        if (first + e < room) keys[first + e] = some[e];
+      }
+      held = 0;
+    };
+    near.each(static_cast<Index>(p), [&](Index k) {
+      some[held++] = static_cast<std::uint64_t>(p) * points + static_cast<std::uint64_t>(order[k]);
+      if (held == most) put();
+    });
+    if (held > 0) put();
+  }
+};
+
+/// The extent of a phyxel of the layer; of none if it is no candidate.
+struct ExtentOf {
+  LayerView layer;
+  const char* is_candidate;
+  __device__ Extent operator()(std::int64_t k) const {
+    if (!is_candidate[k]) return {no_box, 0};
+    return {{layer.position[k], layer.position[k]}, layer.site[k].range};
+  }
+};
+struct ExtentOfBoth {
+  __host__ __device__ Extent operator()(const Extent& a, const Extent& b) const {
+    return {AroundBoth{}(a.box, b.box), Larger{}(a.range, b.range)};
+  }
 };
 
 /// Entries, and flags of the first entry of each row.
@@ -61,22 +104,32 @@ Entries entries_of(DeviceArray<std::uint64_t> keys, const Candidates& points,
   return found;
 }
 
-/// Repeats the entries of each point and body for each of its patches, if there are some, and
-/// returns the patches; none if no point is beside several.
-Numbers repeat_for_patches(Entries& entries, const Candidates& points) {
+/// Rows of entries before they are divided into patches. Arrays have room for a row per entry.
+struct WholeRows {
+  Numbers row;                ///< The row of each entry.
+  DeviceArray<Offset> start;  ///< The first entry of each row, and the end of the last row.
+  DeviceArray<char> divided;  ///< 1 for rows of points beside several patches, else 0.
+};
+
+/// Finds the rows of entries and those that are divided. Sets the numbers of both among the facts.
+/// @param sums of `Entries::begins`
+WholeRows whole_rows_of(const Entries& entries, const Numbers& sums, const Candidates& points,
+                        SearchFacts* facts) {
   const std::size_t count = entries.keys.size();
-  const Numbers sums = running_sums(entries.begins);
-  const auto rows = static_cast<std::size_t>(last_of(sums));
-  Numbers row(count, name);
+  WholeRows whole{{count, name}, {count + 1, name}, cleared<char>(count)};
   for_each("number_rows", count_of(count),
-           [sums = sums.data(), row = row.data()] __device__(std::int64_t e) {
-             row[e] = sums[e + 1] - 1;
+           [sums = sums.data(), begins = entries.begins.data(), row = whole.row.data(),
+            start = whole.start.data(), facts, count] __device__(std::int64_t e) {
+             const Index r = sums[e + 1] - 1;
+             row[e] = r;
+             if (begins[e]) start[r] = e;
+             if (e + 1 < static_cast<std::int64_t>(count)) return;
+             start[r + 1] = e + 1;
+             facts->rows = r + 1;
            });
-  const DeviceArray<Offset> start = starts_of<Offset>(row, rows, name);
-  const auto divided = cleared<char>(rows);
   for_each("divide_rows", count_of(count),
-           [start = start.data(), row = row.data(), keys = entries.keys.data(),
-            near = entries.near.data(), points = points.data(), divided = divided.data(),
+           [start = whole.start.data(), row = whole.row.data(), keys = entries.keys.data(),
+            near = entries.near.data(), points = points.data(), divided = whole.divided.data(),
             n = points.size()] __device__(std::int64_t e) {
              const Index r = row[e];
              const Offset first = start[r];
@@ -87,6 +140,25 @@ Numbers repeat_for_patches(Entries& entries, const Candidates& points) {
                divided[r] = 1;
              }
            });
+  for_each("count_divided", count_of(count),
+           [start = whole.start.data(), divided = whole.divided.data(),
+            facts] __device__(std::int64_t r) {
+             if (!divided[r]) return;
+             atomicAdd(&facts->divided, 1ull);
+             atomicAdd(&facts->repeated, static_cast<unsigned long long>(
+                                             (most_patches - 1) * (start[r + 1] - start[r])));
+           });
+  return whole;
+}
+
+/// Repeats the entries of divided rows for each patch. @returns the patches of the entries
+/// @param rows number of rows. @param more entries that patches have more than the rows
+Numbers repeat_for_patches(Entries& entries, const WholeRows& whole, std::size_t rows,
+                           std::size_t more) {
+  const std::size_t count = entries.keys.size(), all = count + more;
+  const Numbers& row = whole.row;
+  const DeviceArray<Offset>& start = whole.start;
+  const DeviceArray<char>& divided = whole.divided;
   DeviceArray<Offset> copies(rows, name);  // entries of all patches of a row
   for_each("count_patches", count_of(rows),
            [start = start.data(), divided = divided.data(),
@@ -94,8 +166,6 @@ Numbers repeat_for_patches(Entries& entries, const Candidates& points) {
              copies[r] = (divided[r] ? most_patches : 1) * (start[r + 1] - start[r]);
            });
   const DeviceArray<Offset> first = running_sums(copies);
-  const auto all = static_cast<std::size_t>(last_of(first));
-  if (all == count) return {};
   DeviceArray<std::uint64_t> keys(all, name);
   Numbers patch(all, name);
   for_each("repeat_entries", count_of(count),
@@ -116,15 +186,19 @@ Numbers repeat_for_patches(Entries& entries, const Candidates& points) {
 
 }  // namespace
 
-Candidates candidates_of(const LayerView& layer, std::size_t count) {
+Candidates candidates_of(const LayerView& layer, std::size_t count, FactsOnDevice& facts) {
   DeviceArray<char> flags(count, name);
   for_each("choose_candidates", count_of(count),
            [layer, flags = flags.data()] __device__(std::int64_t k) {
              flags[k] = layer.is_near_others(static_cast<Index>(k));
            });
-  const Numbers chosen = flagged_numbers(flags);
-  Candidates some(chosen.size(), name);
-  for_each("make_candidates", count_of(chosen.size()),
+  const thrust::counting_iterator<Index> all(0);
+  const auto chosen = flagged_of<decltype(all), Index>(all, flags, &facts.view()->candidates);
+  const thrust::transform_iterator extents(thrust::counting_iterator<std::int64_t>(0),
+                                           ExtentOf{layer, flags.data()});
+  reduce_into(&facts.view()->extent, extents, count_of(count), Extent{}, ExtentOfBoth{});
+  Candidates some(static_cast<std::size_t>(facts.read().candidates), name);
+  for_each("make_candidates", count_of(some.size()),
            [layer, chosen = chosen.data(), some = some.data()] __device__(std::int64_t c) {
              const Index k = chosen[c];
              ContactCandidate& made = some[c];
@@ -140,13 +214,13 @@ Candidates candidates_of(const LayerView& layer, std::size_t count) {
 }
 
 Numbers in_list_order(const Candidates& points, std::size_t bodies) {
-  DeviceArray<std::uint64_t> list(points.size(), name);
+  DeviceArray<std::uint32_t> list(points.size(), name);
   Numbers by_list(points.size(), name);
   for_each("list_candidates", count_of(points.size()),
            [points = points.data(), list = list.data(),
             by_list = by_list.data()] __device__(std::int64_t p) {
-             list[p] = static_cast<std::uint64_t>(points[p].body) * contact_threads +
-                       static_cast<std::uint64_t>(part_of_list(points[p]));
+             list[p] = static_cast<std::uint32_t>(points[p].body) * contact_threads +
+                       static_cast<std::uint32_t>(part_of_list(points[p]));
              by_list[p] = static_cast<Index>(p);
            });
   if (points.size() > 0) sort_pairs(list, by_list, bits_below(contact_threads * bodies));
@@ -154,56 +228,59 @@ Numbers in_list_order(const Candidates& points, std::size_t bodies) {
 }
 
 DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerView& layer,
-                                         const Numbers& by_list) {
+                                         const Numbers& by_list, const Extent& extent,
+                                         FactsOnDevice& facts, std::size_t& room) {
   const std::size_t n = points.size();
   if (n == 0) return {};
   DeviceArray<Vec3d> now(n, name);
-  Numbers order(n, name);
+  Numbers order(n, name), body(n, name);
   for_each("place_candidates", count_of(n),
-           [points = points.data(), now = now.data(), by_list = by_list.data(),
+           [points = points.data(), now = now.data(), body = body.data(), by_list = by_list.data(),
             order = order.data()] __device__(std::int64_t p) {
              now[p] = points[p].now;
+             body[p] = points[p].body;
              order[by_list[p]] = static_cast<Index>(p);
            });
-  const thrust::transform_iterator ranges(thrust::counting_iterator<std::int64_t>(0),
-                                          RangeOf{points.data()});
-  const double reach = reduce(ranges, count_of(n), 0.0, Larger{}) + layer.skin;
-  const DeviceHash hash(now, {{0, static_cast<Index>(n), reach}});
-  const Near near{layer, hash.view(), points.data(), reach};
-  DeviceArray<Offset> count(n, name);
-  for_each("count_entries", count_of(n), [near, count = count.data()] __device__(std::int64_t p) {
-    Offset own = 0;
-    near.each(static_cast<Index>(p), [&](Index) { ++own; });
-    count[p] = own;
-  });
-  const DeviceArray<Offset> start = running_sums(count);
-  DeviceArray<std::uint64_t> keys(static_cast<std::size_t>(last_of(start)), name);
-  for_each("find_entries", count_of(n),
-           [near, start = start.data(), order = order.data(), keys = keys.data(),
-            n] __device__(std::int64_t p) {
-             Offset next = start[p];
-             near.each(static_cast<Index>(p), [&](Index k) {
-               keys[next++] =
-                   static_cast<std::uint64_t>(p) * n + static_cast<std::uint64_t>(order[k]);
-             });
-           });
+  const double reach = extent.range + layer.skin;
+  const DeviceHash hash(now, extent.box, reach);
+  const Near near{layer, hash.view(), points.data(), body.data(), reach};
+  if (room == 0) room = n;
+  DeviceArray<std::uint64_t> keys;
+  for (bool had_room = false; !had_room;) {
+    keys = {};
+    keys = {room, name};
+    facts.clear();
+    for_each("find_entries", count_of(n),
+             FindEntries{near, order.data(), n, keys.data(), room, &facts.view()->entries});
+    const auto count = static_cast<std::size_t>(facts.read().entries);
+    had_room = count <= room;
+    if (had_room) keys.keep_first(count);
+    if (!had_room || 4 * count < room) room = count + count / 4 + 1;
+  }
   if (keys.size() > 0) sort_values(keys, bits_below(n * n));
   return keys;
 }
 
 FoundRows rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
-                  const Numbers& by_list) {
+                  const Numbers& by_list, FactsOnDevice& facts) {
   const std::size_t n = points.size();
   FoundRows found;
+  facts.clear();
   Entries entries = entries_of(std::move(keys), points, by_list, {});
-  Numbers patch;
-  if (entries.keys.size() > 0) patch = repeat_for_patches(entries, points);
-  if (patch.size() > 0) entries = entries_of(std::move(entries.keys), points, by_list, patch);
+  Numbers sums = running_sums(entries.begins), patch;
+  const WholeRows whole = whole_rows_of(entries, sums, points, facts.view());
+  const SearchFacts& counted = facts.read();
+  const auto rows = static_cast<std::size_t>(counted.rows),
+             divided = static_cast<std::size_t>(counted.divided);
+  if (divided > 0) {
+    patch = repeat_for_patches(entries, whole, rows, static_cast<std::size_t>(counted.repeated));
+    entries = entries_of(std::move(entries.keys), points, by_list, patch);
+    sums = running_sums(entries.begins);
+  }
   const std::size_t count = entries.keys.size();
-  const Numbers sums = running_sums(entries.begins);
   found.near = std::move(entries.near);
   found.row_of_entry = {count, name};
-  found.rows = {static_cast<std::size_t>(last_of(sums)), name};
+  found.rows = {rows + (most_patches - 1) * divided, name};
   for_each("make_rows", count_of(count),
            [layer, keys = entries.keys.data(), near = found.near.data(),
             begins = entries.begins.data(), patch = patch.data(), sums = sums.data(),

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "setup/primitives.cuh"
+#include "setup/search_facts.hpp"
 #include "solver/contact_search.hpp"
 
 namespace phyxel::cuda {
@@ -19,20 +20,21 @@ struct LayerView {
   const double* gain;
   const Index *id, *body;
   const Box* box;  ///< Of bodies.
-  const Index *partner_start, *partner;
+  const Offset* partner_start;
+  const Index* partner;
   const ContactLaw* law;  ///< Of partners.
   double skin;
   int rank;
 
   /// The number of a body among the partners of all; -1 if two do not touch.
-  __device__ Index partner_of(Index body, Index other) const {
-    for (Index k = partner_start[body]; k < partner_start[body + 1]; ++k) {
+  __device__ Offset partner_of(Index body, Index other) const {
+    for (Offset k = partner_start[body]; k < partner_start[body + 1]; ++k) {
       if (partner[k] == other) return k;
     }
     return -1;
   }
   __device__ bool is_near_others(Index k) const {
-    for (Index p = partner_start[body[k]]; p < partner_start[body[k] + 1]; ++p) {
+    for (Offset p = partner_start[body[k]]; p < partner_start[body[k] + 1]; ++p) {
       if (may_be_near(position[k], site[k].range, skin, box[partner[p]])) return true;
     }
     return false;
@@ -71,16 +73,20 @@ DeviceArray<T> gathered(const DeviceArray<T>& values, const Numbers& numbers) {
   return some;
 }
 
-/// The candidates of this rank. @param count phyxels of the layer
-Candidates candidates_of(const LayerView& layer, std::size_t count);
+/// The candidates of this rank. Sets their extent among the facts.
+/// @param count phyxels of the layer
+Candidates candidates_of(const LayerView& layer, std::size_t count, FactsOnDevice& facts);
 /// The candidates in the order that lists have. @param bodies number of bodies of the scene
 Numbers in_list_order(const Candidates& points, std::size_t bodies);
 /// The entries of the lists of all candidates: the number of the point times the number of
 /// candidates, plus the place in `by_list` of the candidate near it; ascending.
+/// @param extent of the candidates. @param room number of entries that memory is asked for, 0 at
+/// the first search; receives that of the next one
 DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerView& layer,
-                                         const Numbers& by_list);
+                                         const Numbers& by_list, const Extent& extent,
+                                         FactsOnDevice& facts, std::size_t& room);
 /// The rows of entries.
 FoundRows rows_of(DeviceArray<std::uint64_t> keys, const Candidates& points, const LayerView& layer,
-                  const Numbers& by_list);
+                  const Numbers& by_list, FactsOnDevice& facts);
 
 }  // namespace phyxel::cuda

@@ -12,18 +12,38 @@ Box box_around(const DeviceArray<Vec3d>& position, Index begin, Index end) {
   return reduce(points, end - begin, nowhere, AroundBoth{});
 }
 
+void DeviceHash::set_mask(std::size_t points) {
+  mask_ = std::bit_ceil(std::max<std::size_t>(points, 8)) - 1;
+}
+
+HashView::Body DeviceHash::body_in(const Box& box, const Body& body) const {
+  const double size = cell_size_for(box.low, box.high, body.cell_size);
+  return {{box.low, 1 / size, mask_}, size, box.high, body.begin, body.end};
+}
+
 void DeviceHash::fill(const DeviceArray<Vec3d>& position, const std::vector<Body>& bodies) {
-  const std::size_t n = position.size();
-  const std::string what = "the spatial hash of " + std::to_string(n) + " phyxels";
-  mask_ = std::bit_ceil(std::max<std::size_t>(n, 8)) - 1;
+  set_mask(position.size());
   std::vector<HashView::Body> all;
   for (const Body& body : bodies) {
-    const Box box = box_around(position, body.begin, body.end);
-    const double size = cell_size_for(box.low, box.high, body.cell_size);
-    all.push_back({{box.low, 1 / size, mask_}, size, box.high, body.begin, body.end});
+    all.push_back(body_in(box_around(position, body.begin, body.end), body));
   }
-  bodies_ = sent(all, what);
+  bodies_ = sent(all, "the spatial hash");
+  sort_into_cells(position);
+}
 
+void DeviceHash::fill(const DeviceArray<Vec3d>& position, const Box& box, double cell_size) {
+  set_mask(position.size());
+  const HashView::Body one = body_in(box, {0, static_cast<Index>(position.size()), cell_size});
+  bodies_ = {1, "the spatial hash"};
+  for_each("set_body", 1, [one, bodies = bodies_.data()] __device__(std::int64_t) {
+    bodies[0] = one;  // a copy from the host would wait
+  });
+  sort_into_cells(position);
+}
+
+void DeviceHash::sort_into_cells(const DeviceArray<Vec3d>& position) {
+  const std::size_t n = position.size();
+  const std::string what = "the spatial hash of " + std::to_string(n) + " phyxels";
   DeviceArray<std::uint32_t> bucket(n, what);
   index_ = {n, what};
   HashView hash = view();
@@ -35,7 +55,7 @@ void DeviceHash::fill(const DeviceArray<Vec3d>& position, const std::vector<Body
              bucket[i] = hash.bucket_of(body, cell);
              index[i] = static_cast<Index>(i);
            });
-  sort_pairs(bucket, index_);
+  sort_pairs(bucket, index_, bits_below(mask_ + 1));
   start_ = starts_of<std::uint32_t>(bucket, mask_ + 1, what);
   entries_ = {n, what};
   hash = view();

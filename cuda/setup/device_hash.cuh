@@ -124,6 +124,11 @@ class DeviceHash {
   DeviceHash(const DeviceArray<Vec3d>& position, const std::vector<Body>& bodies) {
     fill(position, bodies);
   }
+  /// Builds the hash of one body, and does not wait. @param box around the positions
+  /// @param cell_size requested size [m]
+  DeviceHash(const DeviceArray<Vec3d>& position, const Box& box, double cell_size) {
+    fill(position, box, cell_size);
+  }
 
   HashView view() const {
     return {bodies_.data(), static_cast<int>(bodies_.size()), mask_, start_.data(), entries_.data(),
@@ -133,8 +138,14 @@ class DeviceHash {
   double mean_occupancy() const;
 
   void fill(const DeviceArray<Vec3d>& position, const std::vector<Body>& bodies);
+  void fill(const DeviceArray<Vec3d>& position, const Box& box, double cell_size);
+  /// Sorts the points into the cells of `bodies_`.
+  void sort_into_cells(const DeviceArray<Vec3d>& position);
 
  private:
+  void set_mask(std::size_t points);
+  HashView::Body body_in(const Box& box, const Body& body) const;
+
   std::uint64_t mask_ = 0;
   DeviceArray<HashView::Body> bodies_;
   DeviceArray<std::uint32_t> start_;

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cub/block/block_reduce.cuh>
 #include <tuple>
 #include <utility>
@@ -27,6 +28,16 @@ __global__ void find_boxes(const Vec3d* position, const SurfaceSite* site, const
   __shared__ typename Reduce::TempStorage memory;
   const Box all = Reduce(memory).Reduce(box, around);
   if (threadIdx.x == 0) boxes[blockIdx.x] = all;
+}
+
+/// The extent of candidates on the host.
+Extent extent_of(const std::vector<ContactCandidate>& points) {
+  Extent extent;
+  for (const ContactCandidate& point : points) {
+    extend(extent.box, point.now);
+    extent.range = std::max(extent.range, point.site.range);
+  }
+  return extent;
 }
 
 /// Flags of the candidates of a rank that are in rows.
@@ -74,15 +85,23 @@ DeviceArray<char> flags_of(const DeviceArray<char>& chosen, const Candidates& po
   return flags;
 }
 
+/// The numbers of flags that are 1, at the front of an array with room for all.
+/// @param count receives how many there are, on the device
+Numbers flagged_numbers(const DeviceArray<char>& flags, std::int64_t* count) {
+  const thrust::counting_iterator<Index> all(0);
+  return flagged_of<decltype(all), Index>(all, flags, count);
+}
+
 /// Entries of lists by list, each list in the order of the entries. @param list of each entry
+/// @param is_sorted true if the lists of the entries ascend already
 /// @returns the starts of the lists, and the entries
-std::pair<DeviceArray<Offset>, Numbers> grouped(Numbers list, std::size_t lists) {
+std::pair<DeviceArray<Offset>, Numbers> grouped(Numbers list, std::size_t lists, bool is_sorted) {
   Numbers entries(list.size(), name);
   for_each("number_entries", count_of(list.size()),
            [entries = entries.data()] __device__(std::int64_t e) {
              entries[e] = static_cast<Index>(e);
            });
-  if (list.size() > 0) sort_pairs(list, entries, bits_below(lists));
+  if (list.size() > 0 && !is_sorted) sort_pairs(list, entries, bits_below(lists));
   DeviceArray<Offset> starts = starts_of<Offset>(list, lists, name);
   return {std::move(starts), std::move(entries)};
 }
@@ -109,7 +128,8 @@ Numbers number_points(const Candidates& points, const Numbers& own, const Number
   return number;
 }
 
-void set_lists(const Candidates& points, const Numbers& number, FoundRows found,
+/// @param ascend true if the numbers of points are in the order of the candidates
+void set_lists(const Candidates& points, const Numbers& number, FoundRows found, bool ascend,
                DeviceTouchingPoints::Lists& lists) {
   const std::size_t entries = found.near.size(), rows = found.rows.size();
   Numbers list(entries, name), list_of_point(entries, name);
@@ -132,41 +152,65 @@ void set_lists(const Candidates& points, const Numbers& number, FoundRows found,
   const std::size_t count = lists.site.size();
   lists.near_start = starts_of<Offset>(list, contact_threads * rows, name);
   std::tie(lists.entries_of_start, lists.entries_of) =
-      grouped(std::move(list_of_point), contact_threads * count);
-  std::tie(lists.rows_from_start, lists.rows_from) = grouped(std::move(point), count);
+      grouped(std::move(list_of_point), contact_threads * count, false);
+  std::tie(lists.rows_from_start, lists.rows_from) = grouped(std::move(point), count, ascend);
   lists.rows = std::move(found.rows);
   lists.have_patches = found.have_patches;
   lists.near = std::move(found.near);
   lists.rows_naming = gathered(found.row_of_entry, lists.entries_of);
 }
 
-/// Sets the tiles of places, and where these are in them.
-void set_tiles(DeviceTouchingPoints::Own& own, Index tiles) {
-  const std::int64_t count = count_of(own.place.size());
-  const auto used = cleared<char>(static_cast<std::size_t>(tiles));
-  for_each("use_tiles", count,
-           [place = own.place.data(), used = used.data()] __device__(std::int64_t p) {
-             used[place[p] / tile_size] = 1;
+/// Flags of the tiles in which flagged points of this rank are. @param place of the layer
+DeviceArray<char> tiles_of(const DeviceArray<char>& flags, const Candidates& points,
+                           const Numbers& place, Index tiles) {
+  auto used = cleared<char>(static_cast<std::size_t>(tiles));
+  for_each("use_tiles", count_of(points.size()),
+           [flags = flags.data(), points = points.data(), place = place.data(),
+            used = used.data()] __device__(std::int64_t p) {
+             if (flags[p]) used[place[points[p].place] / tile_size] = 1;
            });
-  own.tiles = flagged_numbers(used);
+  return used;
+}
+
+/// Arrays of the layer, shape [layer] each.
+struct LayerSource {
+  const Index *place, *body;
+  const Vec3d *rest, *centre;
+};
+
+/// Sets the arrays of this rank's points from their numbers in the layer, and from their tiles.
+/// @param tiles number of tiles of the model
+void set_own(const LayerSource& all, Index tiles, DeviceTouchingPoints::Own& own) {
+  const std::size_t count = own.layer.size();
   Numbers number(static_cast<std::size_t>(tiles), name);
   for_each("number_tiles", count_of(own.tiles.size()),
            [tiles = own.tiles.data(), number = number.data()] __device__(std::int64_t t) {
              number[tiles[t]] = static_cast<Index>(t);
            });
-  own.entry = {own.place.size(), name};
-  for_each("place_entries", count,
-           [place = own.place.data(), number = number.data(),
+  own.place = {count, name};
+  own.body = {count, name};
+  own.position = {count, name};
+  own.centre = {count, name};
+  own.entry = {count, name};
+  for_each("gather_own", count_of(count),
+           [all, layer = own.layer.data(), number = number.data(), place = own.place.data(),
+            body = own.body.data(), position = own.position.data(), centre = own.centre.data(),
             entry = own.entry.data()] __device__(std::int64_t p) {
-             entry[p] = number[place[p] / tile_size] * tile_size + place[p] % tile_size;
+             const Index k = layer[p], slot = all.place[k];
+             place[p] = slot;
+             body[p] = all.body[k];
+             position[p] = all.rest[k];
+             centre[p] = all.centre[k];
+             entry[p] = number[slot / tile_size] * tile_size + slot % tile_size;
            });
 }
 
 }  // namespace
 
 DeviceTouchingPoints::DeviceTouchingPoints(const SurfaceLayer& layer,
-                                           const std::vector<Index>& place, Index tiles)
-    : layer_(layer), tiles_(tiles) {
+                                           const std::vector<Index>& place, Index tiles,
+                                           cudaStream_t stream)
+    : pool_(std::make_unique<MemoryPool>(stream)), layer_(layer), tiles_(tiles) {
   const Model& model = layer.model();
   std::vector<Index> ids, begin, end;
   std::vector<Vec3d> centres, rest;
@@ -189,78 +233,110 @@ DeviceTouchingPoints::DeviceTouchingPoints(const SurfaceLayer& layer,
   group_end_ = sent(end, name);
 }
 
-std::vector<Box> DeviceTouchingPoints::boxes_of_groups(const DeviceArray<Vec3d>& position) const {
+std::span<const Box> DeviceTouchingPoints::boxes_of_groups(const DeviceArray<Vec3d>& position) {
   const auto groups = static_cast<unsigned>(group_begin_.size());
   if (groups == 0) return {};
+  const Phase phase("boxes of bodies");
   const DeviceArray<Box> boxes(groups, name);
-  find_boxes<<<groups, group_threads>>>(position.data(), site_.data(), group_begin_.data(),
-                                        group_end_.data(), boxes.data());
+  find_boxes<<<groups, group_threads, 0, work_stream()>>>(
+      position.data(), site_.data(), group_begin_.data(), group_end_.data(), boxes.data());
   check_launch({"find_boxes", groups, group_threads, name});
-  return fetched(boxes);
+  group_boxes_.fetch(boxes, work_stream());
+  return group_boxes_.values();
 }
 
+// The pinned arrays may change: the search has waited since they were sent before.
 void DeviceTouchingPoints::send_reach() {
   const BodyContact& contact = layer_.model().body_contact;
-  std::vector<Index> start{0}, partners;
+  const auto send = [](auto& pinned, const auto& values, auto& array) {
+    pinned.resize(values.size());
+    std::copy(values.begin(), values.end(), pinned.data());
+    if (array.size() != values.size()) array = {values.size(), name};
+    pinned.send(array, work_stream());
+  };
+  const Csr& partners = reach_.partners;
   std::vector<ContactLaw> laws;
-  for (std::size_t b = 0; b < reach_.partners.size(); ++b) {
-    for (const Index other : reach_.partners[b]) {
-      partners.push_back(other);
-      laws.push_back(*contact.law_of(static_cast<Index>(b), other));
-    }
-    start.push_back(static_cast<Index>(partners.size()));
+  laws.reserve(partners.indices.size());
+  for (Index b = 0; b < partners.rows(); ++b) {
+    for (const Index other : partners.row(b)) laws.push_back(*contact.law_of(b, other));
   }
-  box_ = sent(reach_.boxes, name);
-  partner_start_ = sent(start, name);
-  partner_ = sent(partners, name);
-  partner_law_ = sent(laws, name);
+  send(sent_box_, reach_.boxes, box_);
+  send(sent_start_, partners.offsets, partner_start_);
+  send(sent_partner_, partners.indices, partner_);
+  send(sent_law_, laws, partner_law_);
+}
+
+LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double skin) const {
+  const Share* const share = layer_.model().share.get();
+  return {position.data(),
+          site_.data(),
+          gain_.data(),
+          id_.data(),
+          body_.data(),
+          box_.data(),
+          partner_start_.data(),
+          partner_.data(),
+          partner_law_.data(),
+          skin,
+          share ? share->communicator->rank() : 0};
 }
 
 void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt, double skin) {
   const Phase phase("points that may touch");
-  const PooledMemory pooled;
+  const PooledMemory pooled(*pool_);
+  pool_->begin_round();
   if (dt != dt_) {
     gain_ = sent(layer_.gains(dt), name);
     dt_ = dt;
   }
-  reach_ = layer_.reach_of(boxes_of_groups(position), skin);
+  reach_ = layer_.reach_of(boxes_of_groups(position), skin, near_bodies_);
   send_reach();
   const Model& model = layer_.model();
-  const int rank = model.share ? model.share->communicator->rank() : 0;
-  const LayerView layer{position.data(),
-                        site_.data(),
-                        gain_.data(),
-                        id_.data(),
-                        body_.data(),
-                        box_.data(),
-                        partner_start_.data(),
-                        partner_.data(),
-                        partner_law_.data(),
-                        skin,
-                        rank};
-  Candidates points = candidates_of(layer, position.size());
-  if (model.share) points = sent(of_all_ranks(model, fetched(points)), name);
+  const LayerView layer = view(position, skin);
+  Phase part("points near other bodies");
+  facts_.clear();
+  Candidates points = candidates_of(layer, position.size(), facts_);
+  Extent extent = facts_.last().extent;
+  if (model.share) {
+    const std::vector<ContactCandidate> all = of_all_ranks(model, fetched(points));
+    extent = extent_of(all);
+    points = sent(all, name);
+  }
+  part.next("points near each other");
   const Numbers by_list = in_list_order(points, reach_.boxes.size());
-  FoundRows found = rows_of(entries_among(points, layer, by_list), points, layer, by_list);
+  DeviceArray<std::uint64_t> keys =
+      entries_among(points, layer, by_list, extent, facts_, entry_room_);
+  part.next("rows of points");
+  FoundRows found = rows_of(std::move(keys), points, layer, by_list, facts_);
   any_ = found.rows.size() > 0;
-  const DeviceArray<char> chosen = in_rows(found, points, rank);
+  const DeviceArray<char> chosen = in_rows(found, points, layer.rank);
   if (model.share) {  // as of `phyxel::TouchingPoints`
     spread(found, chosen);
     const DeviceArray<char> kept = spread(found, chosen);
     found = rows_of(flagged<const std::uint64_t*, std::uint64_t>(found.keys.data(), kept), points,
-                    layer, by_list);
+                    layer, by_list, facts_);
   }
-  const Numbers own = flagged_numbers(flags_of(chosen, points, rank, true));
-  const Numbers other = flagged_numbers(flags_of(chosen, points, rank, false));
+  part.next("lists of points");
+  set_points(points, chosen, std::move(found), layer.rank);
+}
+
+void DeviceTouchingPoints::set_points(const Candidates& points, const DeviceArray<char>& chosen,
+                                      FoundRows found, int rank) {
+  const bool is_share = layer_.model().share != nullptr;
+  const DeviceArray<char> are_own = flags_of(chosen, points, rank, true);
+  facts_.clear();
+  SearchFacts* const facts = facts_.view();
+  Numbers own = flagged_numbers(are_own, &facts->own), other;
+  if (is_share) other = flagged_numbers(flags_of(chosen, points, rank, false), &facts->other);
+  own_.tiles = flagged_numbers(tiles_of(are_own, points, place_, tiles_), &facts->tiles);
+  const SearchFacts& counted = facts_.read();
+  own.keep_first(static_cast<std::size_t>(counted.own));
+  other.keep_first(static_cast<std::size_t>(counted.other));
+  own_.tiles.keep_first(static_cast<std::size_t>(counted.tiles));
   const Numbers number = number_points(points, own, other, own_.layer, lists_);
-  set_lists(points, number, std::move(found), lists_);
-  own_.place = gathered(place_, own_.layer);
-  own_.body = gathered(body_, own_.layer);
-  own_.position = gathered(rest_, own_.layer);
-  own_.centre = gathered(centre_, own_.layer);
-  set_tiles(own_, tiles_);
-  if (model.share) plan_exchange(points, other);
-  PHYXEL_CUDA(cudaStreamSynchronize(cudaStreamLegacy));
+  set_lists(points, number, std::move(found), !is_share, lists_);
+  set_own({place_.data(), body_.data(), rest_.data(), centre_.data()}, tiles_, own_);
+  if (is_share) plan_exchange(points, other);
 }
 
 void DeviceTouchingPoints::plan_exchange(const Candidates& points, const Numbers& other) {
@@ -276,15 +352,10 @@ void DeviceTouchingPoints::plan_exchange(const Candidates& points, const Numbers
   exchange_ = {ranks, wanted, std::move(receive), fetched(own_.layer)};
 }
 
-DeviceArray<double> DeviceTouchingPoints::of_own(const std::vector<double>& of_layer) const {
-  const PooledMemory pooled;
-  DeviceArray<double> some = gathered(sent(of_layer, name), own_.layer);
-  PHYXEL_CUDA(cudaStreamSynchronize(cudaStreamLegacy));
-  return some;
-}
-
-DeviceArray<double> DeviceTouchingPoints::wave_moduli() const {
-  DeviceArray<double> own = of_own(layer_.wave_moduli());
+DeviceArray<double> DeviceTouchingPoints::wave_moduli() {
+  const PooledMemory pooled(*pool_);
+  if (modulus_.size() == 0) modulus_ = sent(layer_.wave_moduli(), name);
+  DeviceArray<double> own = gathered(modulus_, own_.layer);
   if (!layer_.model().share) return own;
   std::vector<double> all = fetched(own);
   all.resize(lists_.site.size());
@@ -292,13 +363,23 @@ DeviceArray<double> DeviceTouchingPoints::wave_moduli() const {
   return sent(all, name);
 }
 
+DeviceArray<double> DeviceTouchingPoints::regains(double dt) {
+  const PooledMemory pooled(*pool_);
+  if (dt != regain_dt_) {
+    regain_ = sent(layer_.regains(dt), name);
+    regain_dt_ = dt;
+  }
+  return gathered(regain_, own_.layer);
+}
+
 std::size_t DeviceTouchingPoints::bytes() const {
   const auto sum = [](const auto&... arrays) { return (arrays.bytes() + ...); };
-  return sum(own_.layer, own_.place, own_.tiles, own_.entry, own_.body, own_.position, own_.centre,
+  return pool_->idle_bytes() +
+         sum(own_.layer, own_.place, own_.tiles, own_.entry, own_.body, own_.position, own_.centre,
              lists_.site, lists_.id, lists_.rows, lists_.near, lists_.rows_naming,
              lists_.entries_of, lists_.rows_from, lists_.near_start, lists_.entries_of_start,
-             lists_.rows_from_start, site_, gain_, place_, id_, body_, rest_, centre_, group_begin_,
-             group_end_, box_, partner_start_, partner_, partner_law_);
+             lists_.rows_from_start, site_, gain_, modulus_, regain_, place_, id_, body_, rest_,
+             centre_, group_begin_, group_end_, box_, partner_start_, partner_, partner_law_);
 }
 
 }  // namespace phyxel::cuda

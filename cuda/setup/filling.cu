@@ -315,6 +315,13 @@ std::vector<double> gaps_of(std::span<const Vec3d> point, double spacing,
   return fetched(gap);
 }
 
+/// A scope with a pool of its own, on CUDA's default stream.
+class Pooled {
+ private:
+  MemoryPool pool_{nullptr};
+  PooledMemory scope_{pool_};
+};
+
 /// A surface on the GPU.
 class SurfaceOnGpu : public SurfaceOnDevice {
  public:
@@ -322,22 +329,19 @@ class SurfaceOnGpu : public SurfaceOnDevice {
       : corners_(sent(surface.corners(), name)),
         nodes_(sent(surface.nodes(), name)),
         boxes_(sent(surface.boxes(), name)) {}
-  SurfaceOnGpu(const SurfaceOnGpu&) = delete;
-  SurfaceOnGpu& operator=(const SurfaceOnGpu&) = delete;
-  ~SurfaceOnGpu() override { PooledMemory::give_back(); }
 
   std::optional<std::vector<Vec3d>> darts(std::span<const Vec3d> candidates,
                                           std::span<const Vec3d> before, double gap,
                                           std::uint64_t seed) const override {
     return unless_full([&](const InsideTest&) {
-      const PooledMemory pool;
+      const Pooled pooled;
       return darts_on_device(candidates, before, gap, seed);
     });
   }
 
   bool even_out(std::span<Vec3d> point, const PointsOnFaces& faces) const override {
     return moves(point, faces.fixed, [&](const InsideTest&) {
-      const PooledMemory pool;
+      const Pooled pooled;
       return evened_out(point, faces);
     });
   }
@@ -365,7 +369,7 @@ class SurfaceOnGpu : public SurfaceOnDevice {
       const DeviceArray<char> moves = sent(which.moves, name);
       const DeviceArray<ClearBall> balls(count, name);
       balls.clear();
-      const PooledMemory pool;
+      const Pooled pooled;
       for (int k = 0; k < which.sweeps; ++k) sweep(here, after, moves, balls, inside, which);
       return fetched(here, which.fixed, count);
     });

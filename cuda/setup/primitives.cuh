@@ -28,11 +28,12 @@ template <class Body>
 void for_each(const char* kernel, std::int64_t count, const Body& body) {
   if (count <= 0) return;
   const auto blocks = static_cast<unsigned>((count + setup_threads - 1) / setup_threads);
-  for_each_kernel<<<blocks, setup_threads>>>(count, body);
+  for_each_kernel<<<blocks, setup_threads, 0, work_stream()>>>(count, body);
   check_launch({kernel, blocks, setup_threads, std::to_string(count) + " at once"});
 }
 
-/// Runs a CUB algorithm with temporary memory: the first call returns its size.
+/// Runs a CUB algorithm with temporary memory on the stream `work_stream()`, which `algorithm`
+/// passes on: its first call returns the size of the memory.
 template <class Algorithm>
 void with_temporary(Algorithm&& algorithm) {
   std::size_t bytes = 0;
@@ -55,7 +56,8 @@ void sort_pairs(DeviceArray<Key>& keys, DeviceArray<Value>& values, int bits = 8
   DeviceArray<Value> sorted_values(values.size(), "set-up");
   with_temporary([&](void* memory, std::size_t& bytes) {
     return cub::DeviceRadixSort::SortPairs(memory, bytes, keys.data(), sorted_keys.data(),
-                                           values.data(), sorted_values.data(), count, 0, bits);
+                                           values.data(), sorted_values.data(), count, 0, bits,
+                                           work_stream());
   });
   keys = std::move(sorted_keys);
   values = std::move(sorted_values);
@@ -66,18 +68,26 @@ void sort_values(DeviceArray<T>& values, int bits = 8 * sizeof(T)) {
   DeviceArray<T> sorted(values.size(), "set-up");
   with_temporary([&](void* memory, std::size_t& bytes) {
     return cub::DeviceRadixSort::SortKeys(memory, bytes, values.data(), sorted.data(),
-                                          static_cast<std::int64_t>(values.size()), 0, bits);
+                                          static_cast<std::int64_t>(values.size()), 0, bits,
+                                          work_stream());
   });
   values = std::move(sorted);
 }
 
 /// Reduces `values` in an unspecified order; `combine` must be associative and commutative.
+/// @param result on the device
+template <class In, class T, class Combine>
+void reduce_into(T* result, In values, std::int64_t count, T start, Combine combine) {
+  with_temporary([&](void* memory, std::size_t& bytes) {
+    return cub::DeviceReduce::Reduce(memory, bytes, values, result, count, combine, start,
+                                     work_stream());
+  });
+}
+/// Reduces them, and waits for the result.
 template <class In, class T, class Combine>
 T reduce(In values, std::int64_t count, T start, Combine combine) {
   const DeviceArray<T> result(1, "set-up");
-  with_temporary([&](void* memory, std::size_t& bytes) {
-    return cub::DeviceReduce::Reduce(memory, bytes, values, result.data(), count, combine, start);
-  });
+  reduce_into(result.data(), values, count, start, combine);
   T out;
   result.download(&out);
   return out;
@@ -107,30 +117,40 @@ struct Smaller {
 template <class T>
 DeviceArray<T> running_sums(const DeviceArray<T>& values) {
   DeviceArray<T> sums(values.size() + 1, "set-up");
-  PHYXEL_CUDA(cudaMemset(sums.data(), 0, sizeof(T)));
+  PHYXEL_CUDA(cudaMemsetAsync(sums.data(), 0, sizeof(T), work_stream()));
   if (values.size() == 0) return sums;
   with_temporary([&](void* memory, std::size_t& bytes) {
     return cub::DeviceScan::InclusiveSum(memory, bytes, values.data(), sums.data() + 1,
-                                         static_cast<std::int64_t>(values.size()));
+                                         static_cast<std::int64_t>(values.size()), work_stream());
   });
   return sums;
 }
 
-/// The values with a flag, in their order. @param flags of the values, 0 or 1, of type char
+/// The values with a flag, in their order, at the front of an array with room for all. Does not
+/// wait. @param flags of the values, 0 or 1, of type char
+/// @param count receives the number of flagged values on the device, if there are flags
 template <class In, class T>
-DeviceArray<T> flagged(In values, const DeviceArray<char>& flags) {
+DeviceArray<T> flagged_of(In values, const DeviceArray<char>& flags, std::int64_t* count) {
   DeviceArray<T> chosen(flags.size(), "set-up");
-  const DeviceArray<std::int64_t> count(1, "set-up");
   if (flags.size() == 0) return chosen;
   with_temporary([&](void* memory, std::size_t& bytes) {
-    return cub::DeviceSelect::Flagged(memory, bytes, values, flags.data(), chosen.data(),
-                                      count.data(), static_cast<std::int64_t>(flags.size()));
+    return cub::DeviceSelect::Flagged(memory, bytes, values, flags.data(), chosen.data(), count,
+                                      static_cast<std::int64_t>(flags.size()), work_stream());
   });
+  return chosen;
+}
+/// The values with a flag, in their order. Waits. @param flags as of `flagged_of`
+template <class In, class T>
+DeviceArray<T> flagged(In values, const DeviceArray<char>& flags) {
+  const DeviceArray<std::int64_t> count(1, "set-up");
+  const DeviceArray<T> chosen = flagged_of<In, T>(values, flags, count.data());
+  if (flags.size() == 0) return {};
   std::int64_t number = 0;
   count.download(&number);
   DeviceArray<T> kept(static_cast<std::size_t>(number), "set-up");
   if (number > 0) {
-    PHYXEL_CUDA(cudaMemcpy(kept.data(), chosen.data(), kept.bytes(), cudaMemcpyDeviceToDevice));
+    PHYXEL_CUDA(cudaMemcpyAsync(kept.data(), chosen.data(), kept.bytes(), cudaMemcpyDeviceToDevice,
+                                work_stream()));
   }
   return kept;
 }

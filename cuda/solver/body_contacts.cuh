@@ -16,6 +16,7 @@
 #include "solver/device_model.cuh"
 #include "solver/device_sums.cuh"
 #include "solver/passes.cuh"
+#include "solver/stream.cuh"
 #include "solver/thread_group.cuh"
 #include "timeline.hpp"
 
@@ -28,8 +29,8 @@ class DeviceBodyContacts {
   explicit DeviceBodyContacts(DeviceModel<Real, StateReal>& model)
       : m_(model),
         layer_(model.model()),
-        points_(layer_, places_of(model.model().body_contact.layer.phyxels),
-                model.tiling().tiles()),
+        points_(layer_, places_of(model.model().body_contact.layer.phyxels), model.tiling().tiles(),
+                model.stream()),
         // Longer lists cost more than rarer searches save: a bin of 1,000 dinos took 2.3 times as
         // long with the widest skin.
         watch_(layer_, 1, layer_.least_skin(), 4),
@@ -68,10 +69,18 @@ class DeviceBodyContacts {
   /// True if bodies touch each other.
   bool acts() const { return m_.model().body_contact.acts(); }
 
-  /// Prepares for a step of `dt` [s]. Of a share: collective.
+  /// Begins a step of `dt` [s]: finds how far phyxels have moved, if it is time to look where
+  /// bodies are. The host looks in `begin_step`, while launches in between run; these must not move
+  /// phyxels.
+  void begin_look(double dt) {
+    is_looking_ = acts() && watch_.is_due(dt);
+    if (is_looking_) find_ways_now();
+  }
+  /// Prepares for the step of `begin_look`. Of a share: collective.
   void begin_step(double dt, const Passes<Real, StateReal>& passes) {
     if (!acts()) return;
-    if (watch_.is_due(dt)) look(dt);
+    if (is_looking_) look(dt);
+    is_looking_ = false;
     dt_ = dt;
     if (!points_.any()) return;
     sums_.prepare(own().place.size(), 1, [&] { m_.wait(); });
@@ -215,30 +224,39 @@ class DeviceBodyContacts {
   /// Finds the points that may touch anew if phyxels have moved far enough.
   void look(double dt) {
     const Phase phase("looking where bodies are");
-    const int count = static_cast<int>(layer_place_.size());
-    const auto find_places = [&] {
-      m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
-                     layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
-    };
-    if (watch_.generation() == 0) find_places();
     if (!watch_.is_late_by(ways_now(), dt)) return;
     find_places();
-    m_.wait();
     points_.find(layer_found_, dt, watch_.skin());
     watch_.found(points_.reach());
     make_arrays(dt);
   }
-  /// The ways of the groups of the layer since places were found.
-  std::vector<SurfaceWay> ways_now() {
-    std::vector<SurfaceWay> ways(layer_.groups().size());
-    if (ways.empty()) return ways;
-    const auto blocks = static_cast<unsigned>(ways.size());
+  void find_places() const {
+    const int count = static_cast<int>(layer_place_.size());
+    m_.launch_each("copy_places", copy_places<Real, StateReal>, count, m_.fields(),
+                   layer_place_.data(), layer_position_.data(), layer_found_.data(), count);
+  }
+  /// Begins to find the ways of the groups of the layer since places were found.
+  void find_ways_now() {
+    if (watch_.generation() == 0) find_places();
+    const auto blocks = static_cast<unsigned>(layer_.groups().size());
+    if (blocks == 0) return;
     find_ways<<<blocks, tile_size, 0, m_.stream()>>>(
         m_.fields(), layer_place_.data(), layer_position_.data(), layer_found_.data(),
         group_begin_.data(), group_end_.data(), ways_.data());
     m_.launched("find_ways", blocks, tile_size);
-    m_.wait();
-    const std::vector<double> numbers = fetched(ways_);
+    found_ways_.begin_fetch(ways_, m_.stream());
+    PHYXEL_CUDA(cudaEventRecord(ways_are_there_.get(), m_.stream()));
+  }
+  /// The ways. Waits for them.
+  std::vector<SurfaceWay> ways_now() const {
+    std::vector<SurfaceWay> ways(layer_.groups().size());
+    if (ways.empty()) return ways;
+    Phase phase("steps in progress");
+    const cudaError_t error = cudaEventSynchronize(ways_are_there_.get());
+    if (error != cudaSuccess) m_.wait();  // its message names the last launch
+    check_cuda(error, "cudaEventSynchronize");
+    phase.end();
+    const std::span<const double> numbers = found_ways_.values();
     const auto vector = [&](std::size_t first) {
       return Vec3d{numbers[first], numbers[first + 1], numbers[first + 2]};
     };
@@ -250,32 +268,36 @@ class DeviceBodyContacts {
   }
   /// Makes the arrays of the passes for the points that are found.
   void make_arrays(double dt) {
-    const PooledMemory pooled;
+    const Phase phase("arrays of contact");
+    const PooledMemory pooled(points_.pool());
     const std::size_t count = own().place.size(), points = lists().site.size(),
                       rows = lists().rows.size();
-    gradients_ = {9 * stride(), name};
-    forces_ = {count, name};
-    motion_ = {points, name};
-    motion_.clear();
-    velocity_ = {points, name};
-    velocity_.clear();
-    share_ = {points, name};
-    is_active_ = {points, name};
-    const auto cleared = [](auto& array, std::size_t size) {
+    // The array that was there is freed first, so that the new one gets its memory.
+    const auto make = [](auto& array, std::size_t size) {
+      array = {};
       array = {size, name};
+    };
+    const auto make_cleared = [&](auto& array, std::size_t size) {
+      make(array, size);
       array.clear();
     };
-    cleared(touch_, rows);
-    cleared(is_inside_, rows);
-    cleared(wakes_, rows);
-    cleared(way_, 1);
-    cleared(carries_, lists().near.size());
-    response_ = {rows, name};
-    force_ = {rows, name};
+    make(gradients_, 9 * stride());
+    make(forces_, count);
+    make_cleared(motion_, points);
+    make_cleared(velocity_, points);
+    make(share_, points);
+    make(is_active_, points);
+    make_cleared(touch_, rows);
+    make_cleared(is_inside_, rows);
+    make_cleared(wakes_, rows);
+    make_cleared(way_, 1);
+    make_cleared(carries_, lists().near.size());
+    make(response_, rows);
+    make(force_, rows);
     in_patch_ = {};
     if (lists().have_patches) {
-      in_patch_ = {lists().near.size(), name};
-      PHYXEL_CUDA(cudaMemset(in_patch_.data(), 1, in_patch_.bytes()));
+      make(in_patch_, lists().near.size());
+      PHYXEL_CUDA(cudaMemsetAsync(in_patch_.data(), 1, in_patch_.bytes(), m_.stream()));
     }
     if (!pushes_) return;
     regain_ = points_.regains(dt);
@@ -353,6 +375,9 @@ class DeviceBodyContacts {
   DeviceArray<Vec3<double>> layer_position_, layer_found_;
   DeviceArray<Index> group_begin_, group_end_;  // groups of the layer
   DeviceArray<double> ways_;                    // of these groups
+  PinnedArray<double> found_ways_;              // the same on the host
+  Event ways_are_there_;                        // recorded after their copy
+  bool is_looking_ = false;                     // from `begin_look` to `begin_step`
   DeviceArray<Real> gradients_;                 // of this device's points
   DeviceArray<PointForces> forces_;             // on them
   DeviceArray<double> regain_, modulus_;        // of penalties; empty without them

@@ -117,6 +117,7 @@ class CudaBackend final : public Backend {
     auto of_obstacles = contacts_.kept();
     StepSums of_bodies = body_contacts_.sums();
     add_loads(time);
+    body_contacts_.begin_look(dt);
     passes_->stress(HistoryUse::trial, history_interval_);
     contacts_.remember_velocities();
     body_contacts_.begin_step(dt, *passes_);
@@ -359,6 +360,7 @@ class CudaBackend final : public Backend {
   /// @param follows true right after another step of the same graph
   void launch_step(double time, const Advection* surfels, bool follows = false) {
     add_loads(time);
+    body_contacts_.begin_look(m_.dt());
     passes_->stress(HistoryUse::commit, history_interval_);
     history_interval_ = m_.dt();
     if (fresh_ || boundary_.changes() || contacts_.acts() || body_contacts_.acts()) {

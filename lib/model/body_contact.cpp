@@ -10,6 +10,7 @@
 #include "mesh/surface_topology.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/contact.hpp"
+#include "model/lists_from_pairs.hpp"
 #include "model/parts.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/mesh.hpp"
@@ -139,13 +140,14 @@ Overlap deepest_overlap(const Model& model) {
   const std::vector<Box> boxes = tabulated(contact.distances.size(), [&](std::size_t b) {
     return contact.distances[b] ? box_of(contact.distances[b]) : Box{};
   });
-  const std::vector<std::vector<Index>> partners = partners_of_bodies(contact, boxes);
+  NearBoxes near;
+  const Csr partners = partners_of_bodies(contact, boxes, near);
   Overlap found;
   // A body whose deepest place is inside another one, as that of a body twice at the same place.
   for (const Part& part : model.parts) {
     if (part.begin == part.owned_end() || !contact.distances[part.body]) continue;
     const Vec3d middle = contact.distances[part.body].deepest();
-    for (const Index other : partners[part.body]) {
+    for (const Index other : partners.row(part.body)) {
       if (other == part.body) continue;
       const double depth = -contact.distances[other].view().gap(middle).distance;
       if (depth > found.depth) found = {depth, part.begin, other};
@@ -154,7 +156,7 @@ Overlap deepest_overlap(const Model& model) {
   for (std::size_t k = 0; k < contact.layer.phyxels.size(); ++k) {
     const Index i = contact.layer.phyxels[k];
     const Index body = part_of(model, i).body;
-    for (const Index other : partners[body]) {
+    for (const Index other : partners.row(body)) {
       if (other == body || !contains(boxes[other], model.position[i])) continue;
       const double depth =
           contact.layer.offset[k] - contact.distances[other].view().gap(model.position[i]).distance;
@@ -253,19 +255,23 @@ void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSu
   }
 }
 
-std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
-                                                   std::span<const Box> boxes) {
-  std::vector<std::vector<Index>> partners(boxes.size());
-  for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
+Csr partners_of_bodies(const BodyContact& contact, std::span<const Box> boxes, NearBoxes& near) {
+  std::vector<std::pair<Index, Index>> pairs;
+  near.for_each_overlap(boxes, [&](std::size_t a, std::size_t b) {
     const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
     if (!contact.distances[a] || !contact.distances[b] || !contact.law_of(first, second)) return;
-    partners[a].push_back(second);
-    partners[b].push_back(first);
+    pairs.emplace_back(first, second);
+    pairs.emplace_back(second, first);
   });
   for (std::size_t b = 0; b < boxes.size(); ++b) {
     const auto itself = static_cast<Index>(b);
-    if (contact.distances[b] && contact.law_of(itself, itself)) partners[b].push_back(itself);
-    std::sort(partners[b].begin(), partners[b].end());
+    if (contact.distances[b] && contact.law_of(itself, itself)) pairs.emplace_back(itself, itself);
+  }
+  Csr partners;
+  group(boxes.size(), pairs, partners.offsets, partners.indices);
+  for (std::size_t b = 0; b < boxes.size(); ++b) {
+    std::sort(partners.indices.begin() + partners.offsets[b],
+              partners.indices.begin() + partners.offsets[b + 1]);
   }
   return partners;
 }

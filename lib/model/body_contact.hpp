@@ -8,7 +8,9 @@
 #include <vector>
 
 #include "model/box.hpp"
+#include "model/near_boxes.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/neighbourhood.hpp"
 
 namespace phyxel {
 
@@ -37,8 +39,8 @@ void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSu
 
 /// The bodies that each body touches if it meets them, by their boxes: ascending, and with the body
 /// itself if its parts touch each other.
-std::vector<std::vector<Index>> partners_of_bodies(const BodyContact& contact,
-                                                   std::span<const Box> boxes);
+/// @param near has served earlier boxes of the bodies, or none
+Csr partners_of_bodies(const BodyContact& contact, std::span<const Box> boxes, NearBoxes& near);
 
 /// The error of a model whose bodies are to touch but overlap at the start. Empty if none do. Of a
 /// share: collective, and empty on all ranks but one.

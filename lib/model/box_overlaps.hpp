@@ -34,10 +34,13 @@ void for_each_overlap(std::span<const Box> boxes, Visit&& visit) {
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
             [&](std::size_t a, std::size_t b) { return boxes[a].low.x < boxes[b].low.x; });
+  std::vector<Box> sorted;  // one after the other in memory
+  sorted.reserve(order.size());
+  for (const std::size_t b : order) sorted.push_back(boxes[b]);
   for (std::size_t k = 0; k < order.size(); ++k) {
-    const Box& box = boxes[order[k]];
-    for (std::size_t l = k + 1; l < order.size() && boxes[order[l]].low.x <= box.high.x; ++l) {
-      if (overlap(box, boxes[order[l]])) visit(order[k], order[l]);
+    const Box box = sorted[k];
+    for (std::size_t l = k + 1; l < order.size() && sorted[l].low.x <= box.high.x; ++l) {
+      if (overlap(box, sorted[l])) visit(order[k], order[l]);
     }
   }
 }

@@ -75,6 +75,7 @@ class TouchingPoints {
   const Model& model_;
   const SurfaceLayer& layer_;
   double skin_ = 0;  // [m]
+  NearBoxes near_bodies_;
   BodyReach reach_;
   PointExchange exchange_;
   std::vector<Index> own_;

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <utility>
 
+#include "model/lists_from_pairs.hpp"
 #include "rank_exchange.hpp"
-#include "solver/lists_from_pairs.hpp"
 
 namespace phyxel {
 namespace {

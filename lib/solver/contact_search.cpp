@@ -4,9 +4,9 @@
 #include <cmath>
 #include <tuple>
 
+#include "model/lists_from_pairs.hpp"
 #include "model/spatial_hash.hpp"
 #include "rank_exchange.hpp"
-#include "solver/lists_from_pairs.hpp"
 #include "tabulated.hpp"
 
 namespace phyxel {

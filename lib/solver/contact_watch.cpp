@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "model/box_overlaps.hpp"
-
 namespace phyxel {
 namespace {
 
@@ -86,7 +84,7 @@ LayerWatch::BodyMotions LayerWatch::body_motions(double dt) const {
   const std::size_t count = layer_.model().body_contact.distances.size();
   BodyMotions bodies{std::vector(count, no_box), std::vector(count, no_box), reach_.boxes};
   for (std::size_t g = 0; g < ways_.size(); ++g) {
-    const Index body = layer_.bodies()[layer_.groups()[g].begin];
+    const Index body = layer_.bodies_of_groups()[g];
     bodies.speeds[body] = together(bodies.speeds[body], ways_[g].speeds);
     bodies.ways[body] = together(bodies.ways[body], ways_[g].moved);
   }
@@ -100,14 +98,14 @@ LayerWatch::BodyMotions LayerWatch::body_motions(double dt) const {
 }
 
 template <class Visit>
-void LayerWatch::for_each_meeting(std::span<const Box> boxes, Visit&& visit) const {
-  for_each_overlap(boxes, visit);
+void LayerWatch::for_each_meeting(std::span<const Box> boxes, Visit&& visit) {
+  near_.for_each_overlap(boxes, visit);
   for (std::size_t b = 0; b < boxes.size() && layer_.model().body_contact.self; ++b) {
     if (is_filled(boxes[b])) visit(b, b);
   }
 }
 
-double LayerWatch::fastest_meeting(const BodyMotions& bodies) const {
+double LayerWatch::fastest_meeting(const BodyMotions& bodies) {
   if (bodies.boxes.empty()) {
     Box all = no_box;
     for (const Box& speeds : bodies.speeds) all = together(all, speeds);
@@ -124,12 +122,12 @@ double LayerWatch::fastest_meeting(const BodyMotions& bodies) const {
   return fastest;
 }
 
-bool LayerWatch::have_come_near(const BodyMotions& bodies) const {
+bool LayerWatch::have_come_near(const BodyMotions& bodies) {
   const BodyContact& contact = layer_.model().body_contact;
   bool is_late = false;
   for_each_meeting(bodies.boxes, [&](std::size_t a, std::size_t b) {
     const auto first = static_cast<Index>(a), second = static_cast<Index>(b);
-    const std::vector<Index>& near = reach_.partners[a];
+    const std::span<const Index> near = reach_.partners.row(first);
     const bool were_near = std::binary_search(near.begin(), near.end(), second);
     is_late = is_late || (were_near ? largest_difference(bodies.ways[a], bodies.ways[b]) > skin_
                                     : contact.law_of(first, second) != nullptr);

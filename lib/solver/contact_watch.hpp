@@ -121,12 +121,12 @@ class LayerWatch {
   BodyMotions body_motions(double dt) const;
   /// Calls visit(a, b) for bodies whose boxes overlap; with a = b if bodies may touch themselves.
   template <class Visit>
-  void for_each_meeting(std::span<const Box> boxes, Visit&& visit) const;
+  void for_each_meeting(std::span<const Box> boxes, Visit&& visit);
   /// True if bodies may touch in the next step at places that are not among the points.
-  bool have_come_near(const BodyMotions& bodies) const;
+  bool have_come_near(const BodyMotions& bodies);
   /// The largest relative speed of bodies that may soon be near each other [m/s]; of all bodies
   /// before points are found.
-  double fastest_meeting(const BodyMotions& bodies) const;
+  double fastest_meeting(const BodyMotions& bodies);
   /// Sets the skin for bodies that move against each other at a speed [m/s].
   void set_skin(double speed, double dt);
 
@@ -136,6 +136,7 @@ class LayerWatch {
   double widest_, skin_;          // [m]
   std::vector<Vec3d> found_at_;   // [m], shape [layer]
   std::vector<SurfaceWay> ways_;  // of each group
+  NearBoxes near_;                // of bodies
   BodyReach reach_;               // when points were found
 };
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <utility>
 
+#include "model/lists_from_pairs.hpp"
 #include "solver/body_lattices.hpp"
-#include "solver/lists_from_pairs.hpp"
 #include "solver/on_axes.hpp"
 
 namespace phyxel {

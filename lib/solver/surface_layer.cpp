@@ -82,6 +82,7 @@ SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
   double least = HUGE_VAL;
   for (const SurfaceSite& site : sites_) least = std::min(least, site.range);
   groups_ = groups_of(model, model.body_contact.layer);
+  for (const LayerGroup& group : groups_) body_of_group_.push_back(bodies_[group.begin]);
   if (model.share) least = model.share->communicator->smallest(least);
   least_range_ = least;
 }
@@ -118,17 +119,19 @@ Box SurfaceLayer::box_of(const LayerGroup& group, std::span<const Vec3d> positio
   return box;
 }
 
-BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position, double skin) const {
+BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position, double skin,
+                                 NearBoxes& near) const {
   return reach_of(
-      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }), skin);
+      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }), skin,
+      near);
 }
 
-BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, double skin) const {
+BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, double skin, NearBoxes& near) const {
   const Phase phase("bodies near each other");
   BodyReach reach{.boxes = std::vector(model_.body_contact.distances.size(), no_box),
                   .partners = {}};
   for (std::size_t g = 0; g < groups_.size(); ++g) {
-    Box& box = reach.boxes[bodies_[groups_[g].begin]];
+    Box& box = reach.boxes[body_of_group_[g]];
     box = together(box, boxes[g]);
   }
   if (model_.share) {
@@ -142,8 +145,9 @@ BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, double skin) const 
     }
   }
   std::vector<Box> with_skin;
+  with_skin.reserve(reach.boxes.size());
   for (const Box& box : reach.boxes) with_skin.push_back(grown(box, 0.5 * skin));
-  reach.partners = partners_of_bodies(model_.body_contact, with_skin);
+  reach.partners = partners_of_bodies(model_.body_contact, with_skin, near);
   return reach;
 }
 

@@ -6,7 +6,9 @@
 
 #include "model/box.hpp"
 #include "model/contact_groups.hpp"
+#include "model/near_boxes.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/neighbourhood.hpp"
 #include "phyxel/physics/body_contact.hpp"
 
 namespace phyxel {
@@ -17,7 +19,7 @@ struct BodyReach {
   std::vector<Box> boxes;
   /// The bodies within a skin of each body that it touches if they meet, ascending; with the body
   /// itself if its parts touch each other.
-  std::vector<std::vector<Index>> partners;
+  Csr partners;
 };
 
 /// The contact layer of a model's bodies.
@@ -35,6 +37,8 @@ class SurfaceLayer {
   const std::vector<Index>& bodies() const { return bodies_; }
   /// Groups of the layer, in its order.
   const std::vector<LayerGroup>& groups() const { return groups_; }
+  /// The body of each group.
+  const std::vector<Index>& bodies_of_groups() const { return body_of_group_; }
   /// The smallest and the largest skin [m]: contact lists stay valid until phyxels have moved by it
   /// against each other.
   double least_skin() const { return 0.25 * least_range_; }
@@ -50,9 +54,10 @@ class SurfaceLayer {
   /// The box of a group, grown by the ranges of its phyxels. @param position shape [phyxels] [m]
   Box box_of(const LayerGroup& group, std::span<const Vec3d> position) const;
   /// The extents of bodies. Of a share: collective. @param boxes of the groups (`box_of`)
-  BodyReach reach_of(std::span<const Box> boxes, double skin) const;
+  /// @param near has served earlier calls, or none
+  BodyReach reach_of(std::span<const Box> boxes, double skin, NearBoxes& near) const;
   /// The same from places [m], shape [phyxels].
-  BodyReach reach_at(std::span<const Vec3d> position, double skin) const;
+  BodyReach reach_at(std::span<const Vec3d> position, double skin, NearBoxes& near) const;
 
   std::size_t bytes() const {
     return sites_.size() * sizeof(SurfaceSite) + bodies_.size() * sizeof(Index);
@@ -63,6 +68,7 @@ class SurfaceLayer {
   std::vector<SurfaceSite> sites_;
   std::vector<Index> bodies_;
   std::vector<LayerGroup> groups_;
+  std::vector<Index> body_of_group_;
   double least_range_ = 0;  // of all phyxels [m]
 };
 

@@ -33,7 +33,7 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
   for (std::size_t k = 0; k < position.size(); ++k) {
     const Index body = layer_.bodies()[k];
     SurfaceSite site = layer_.sites()[k];
-    const std::vector<Index>& others = reach_.partners[body];
+    const std::span<const Index> others = reach_.partners.row(body);
     if (std::none_of(others.begin(), others.end(), [&](Index b) {
           return may_be_near(position[k], site.range, skin_, reach_.boxes[b]);
         })) {
@@ -49,7 +49,7 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
 void TouchingPoints::find(std::span<const Vec3d> position, double dt, double skin) {
   const Phase phase("points that may touch");
   skin_ = skin;
-  reach_ = layer_.reach_at(position, skin);
+  reach_ = layer_.reach_at(position, skin, near_bodies_);
   const std::vector<ContactCandidate> all = candidates(position, dt);
   ContactRows found = find_rows(model_.body_contact, all, skin);
   any_ = !found.rows.empty();

@@ -39,11 +39,41 @@ class DeviceErrors : public ::testing::Test {
   }
 };
 using DeviceErrorsDeathTest = DeviceErrors;
+using PooledArrays = DeviceErrors;
 
 TEST(Device, NoneIsExplained) {
   if (!cuda_devices().empty()) GTEST_SKIP() << "there is a CUDA device";
   EXPECT_THAT(message_of([] { use_cuda_device(0); }),
               AllOf(HasSubstr("no "), HasSubstr("allowed: the CPU")));
+}
+
+TEST_F(PooledArrays, GetTheMemoryOfEarlierOnes) {
+  MemoryPool pool(nullptr);
+  const PooledMemory pooled(pool);
+  const int* first = nullptr;
+  {
+    const DeviceArray<int> numbers(1000, "numbers");
+    first = numbers.data();
+    EXPECT_EQ(pool.idle_blocks(), 0u);
+  }
+  EXPECT_EQ(pool.idle_blocks(), 1u);
+  EXPECT_GE(pool.idle_bytes(), 1000 * sizeof(int));
+  DeviceArray<int> again(990, "numbers of about the same size"), more(990, "more numbers");
+  EXPECT_EQ(again.data(), first);
+  EXPECT_NE(more.data(), first);
+  std::vector<int> values(990, 7);
+  again.upload(values.data());
+  again.keep_first(3);
+  values.assign(990, 0);
+  again.download(values.data());
+  EXPECT_EQ(values[2], 7);
+  EXPECT_EQ(values[3], 0);
+  // Blocks that are not asked for any more go back to the device after many rounds.
+  again = {};
+  more = {};
+  EXPECT_EQ(pool.idle_blocks(), 2u);
+  for (int round = 0; round < 100; ++round) pool.begin_round();
+  EXPECT_EQ(pool.idle_blocks(), 0u);
 }
 
 TEST_F(DeviceErrors, OutOfMemorySaysForWhatHowMuchAndWhatIsThere) {

@@ -128,6 +128,7 @@ struct Watched {
   Model model;
   SurfaceLayer layer{model};
   LayerWatch watch{layer, 1, 0.5 * layer.most_skin()};
+  NearBoxes near;
   std::vector<Vec3d> way, velocity;  // of each body
 
   explicit Watched(const std::vector<Vec3d>& places) : model(model_of(places)) {
@@ -151,7 +152,7 @@ struct Watched {
     for (const Index i : model.body_contact.layer.phyxels) {
       position.push_back(model.position[i] + state_of(i).displacement);
     }
-    watch.found(position, layer.reach_at(position, watch.skin()));
+    watch.found(position, layer.reach_at(position, watch.skin(), near));
     return true;
   }
 };
@@ -185,6 +186,7 @@ TEST(LayerWatch, LooksAtBodiesThatMoveAgainstEachOtherAlone) {
 TEST(LayerWatch, LooksAsSoonAsBodiesMayHaveGoneFartherThanTheSkin) {
   const Watched bodies({{}, {0.25, 0, 0}});
   LayerWatch rare(bodies.layer, 1, bodies.layer.least_skin(), 4);
+  NearBoxes near;
   double step = 2 * dt;
   const auto next_look = [&](double speed) {
     const auto state_of = [&](Index i) {
@@ -192,7 +194,8 @@ TEST(LayerWatch, LooksAsSoonAsBodiesMayHaveGoneFartherThanTheSkin) {
     };
     step *= 0.5;  // a step of another size is looked at anew
     EXPECT_TRUE(rare.is_late(step, state_of));
-    rare.found(bodies.layer.reach_at(std::vector<Vec3d>(bodies.layer.sites().size()), rare.skin()));
+    const std::vector<Vec3d> position(bodies.layer.sites().size());
+    rare.found(bodies.layer.reach_at(position, rare.skin(), near));
     int steps = 1;
     while (!rare.is_due(step)) ++steps;
     return steps;
