@@ -32,6 +32,12 @@ struct PointWay {
   PHYXEL_HD double sum() const { return before + in_step; }
 };
 
+/// The components of a vector along the axes on which a phyxel is free.
+PHYXEL_HD Vec3<double> along_free_axes(const SurfaceSite& site, Vec3<double> v) {
+  const Vec3<double> m = site.mobility;
+  return {m.x > 0 ? v.x : 0.0, m.y > 0 ? v.y : 0.0, m.z > 0 ? v.z : 0.0};
+}
+
 /// The arrays of the passes. Whoever fills them runs `find_patch` and `find_touch` for all rows,
 /// `find_share` for all points on which forces may act, and `find_response` for all rows; then, in
 /// each sweep, `find_force` for all rows and `forces_on` for its own points, whose velocities it
@@ -141,13 +147,19 @@ struct ContactPasses {
     found.target = target_velocity(touch[r], relative_velocity(threads, r),
                                    motion[here.point].earlier - threads.sum(earlier), here.law,
                                    depth_recovery(site[here.point], dt), dt);
+    const double free = free_share(threads, r);
+    constexpr double almost_one = 0.999;  // by rounding; 1 of a free point on a held surface
+    if (free < almost_one) {
+      found.free = free > 0 ? free : 0;
+      found.target *= found.free * found.free;
+    }
     if (threads.is_first()) response[r] = found;
   }
   template <class Threads>
   PHYXEL_HD void find_force(const Threads& threads, Index r) const {
     SurfaceForce found{};
     if (touch[r].is_inside) {
-      found = surface_force(touch[r], response[r], relative_velocity(threads, r), row[r].law);
+      found = surface_force(touch[r], response[r], velocity_of_free(threads, r), row[r].law);
     }
     if (threads.is_first()) force[r] = found;
   }
@@ -206,6 +218,39 @@ struct ContactPasses {
     });
     return velocity[row[r].point] - threads.sum(surface);
   }
+  /// The share of a row that is free along its normal, Σ r_i n̄ · F_i n̄ with the free axes F_i of
+  /// its point (r = 1) and of those that carry it: 2 if nothing is held.
+  template <class Threads>
+  PHYXEL_HD double free_share(const Threads& threads, Index r) const {
+    const Vec3<double> n = touch[r].normal;
+    double surface = 0;
+    threads.each(entries_of_row(r), [&](Offset e) {
+      const double part = carries[e].part;
+      if (part != 0) surface += part * dot(n, along_free_axes(site[near[e]], n));
+    });
+    return dot(n, along_free_axes(site[row[r].point], n)) + threads.sum(surface);
+  }
+  /// The velocity that the force of a row is to change. If only a share s < 1 of the row is free,
+  /// that is
+  ///
+  ///   v' = s (F_p (v_p - Σ r_k v_k) + Σ r_k F_k (v_p - v_k)),
+  ///
+  /// so that the few phyxels that are free follow the point, and no faster, by a force that is no
+  /// larger than one on a free point: they cannot make good what held ones would have to do.
+  template <class Threads>
+  PHYXEL_HD Vec3<double> velocity_of_free(const Threads& threads, Index r) const {
+    const Vec3<double> whole = relative_velocity(threads, r);
+    const double free = response[r].free;
+    if (free == 1) return whole;
+    const Index p = row[r].point;
+    Vec3<double> surface{};
+    threads.each(entries_of_row(r), [&](Offset e) {
+      const double part = carries[e].part;
+      const Index k = near[e];
+      if (part != 0) surface += part * along_free_axes(site[k], velocity[p] - velocity[k]);
+    });
+    return free * (along_free_axes(site[p], whole) + threads.sum(surface));
+  }
 };
 
 /// The passes of contact by penalties. At the start of a step, where points are both before and
@@ -226,7 +271,7 @@ struct PenaltyPasses : ContactPasses {
   PHYXEL_HD void find_rub(const Threads& threads, Index r) const {
     if (!touch[r].is_inside) return;
     SurfaceForce found{.push = force[r].push};
-    add_friction(touch[r], response[r], relative_velocity(threads, r), row[r].law, found);
+    add_friction(touch[r], response[r], velocity_of_free(threads, r), row[r].law, found);
     if (threads.is_first()) force[r] = found;
   }
   /// The energy of a row whose `find_push` has been run [J].
