@@ -8,7 +8,6 @@
 #include "mesh/distance_field.hpp"
 #include "mesh/rigid_copy.hpp"
 #include "mesh/surface_topology.hpp"
-#include "model/assembly.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/contact.hpp"
 #include "model/parts.hpp"
@@ -112,17 +111,6 @@ struct Original {
   Surface surface;
   LayerSupports supports;  ///< Its own: its field does not depend on whether there are copies.
 };
-
-/// The rigid motion by which a body of the scene comes to its place. Fields of distances are made
-/// where bodies are without it, so that copies, however they are turned, have the same one.
-RigidMotion placing_of(const BodyRequest& request) {
-  return {rotation_of(request), request.translation};
-}
-
-/// The motion that comes of one motion and a later one.
-RigidMotion composed(const RigidMotion& first, const RigidMotion& later) {
-  return {later.turn * first.turn, later.turn * first.place + later.place};
-}
 
 /// The rigid motion from a body to its copy. Copies have phyxels as far apart, but for rounding and
 /// for what clouds of another rotation differ by.
@@ -245,23 +233,16 @@ void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSu
     for (; o < originals.size(); ++o) {
       const std::optional<RigidMotion> motion = motion_to(originals[o], surface, supports[b]);
       if (!motion) continue;
-      const RigidMotion placed = composed(placing_of(scene.bodies[originals[o].body]), *motion);
-      distances[b] = {nullptr, placed.turn, placed.place};
+      distances[b] = {nullptr, motion->turn, motion->place};
       break;
     }
-    if (o == originals.size()) {
-      const RigidMotion placed = placing_of(scene.bodies[b]);
-      distances[b] = {nullptr, placed.turn, placed.place};
-      originals.push_back({b, std::move(surface), supports[b]});
-    }
+    if (o == originals.size()) originals.push_back({b, std::move(surface), supports[b]});
     original_of[b] = o;
   }
   double largest = 0;
   for (const LayerSupports& s : supports) largest = std::max(largest, s.most);
   std::vector<std::shared_ptr<const DistanceArrays>> made;
   for (Original& original : originals) {
-    const RigidMotion placed = placing_of(scene.bodies[original.body]);
-    for (Vec3d& x : original.surface.position) x = transpose(placed.turn) * (x - placed.place);
     made.push_back(distances_of(scene.bodies[original.body], std::move(original.surface),
                                 original.supports, largest));
   }
