@@ -134,12 +134,15 @@ struct ContactPasses {
   PHYXEL_HD void find_response(const Threads& threads, Index r) const {
     if (!touch[r].is_inside) return;
     const ContactRow& here = row[r];
+    const Vec3<double> n = touch[r].normal;
     Vec3<double> mobility{}, earlier{};
+    double free = 0;  // Σ r_k n̄ · F_k n̄
     threads.each(entries_of_row(r), [&](Offset e) {
       const double part = carries[e].part;
       if (part == 0) return;
       mobility += std::fabs(part) * share[near[e]] * site[near[e]].mobility;
       earlier += part * motion[near[e]].earlier;
+      free += part * dot(n, along_free_axes(site[near[e]], n));
     });
     SurfaceResponse found;
     found.mobility = (1 / site[here.point].area) *
@@ -147,7 +150,7 @@ struct ContactPasses {
     found.target = target_velocity(touch[r], relative_velocity(threads, r),
                                    motion[here.point].earlier - threads.sum(earlier), here.law,
                                    depth_recovery(site[here.point], dt), dt);
-    const double free = free_share(threads, r);
+    free = dot(n, along_free_axes(site[here.point], n)) + threads.sum(free);  // 2: nothing is held
     constexpr double almost_one = 0.999;  // by rounding; 1 of a free point on a held surface
     if (free < almost_one) {
       found.free = free > 0 ? free : 0;
@@ -218,20 +221,8 @@ struct ContactPasses {
     });
     return velocity[row[r].point] - threads.sum(surface);
   }
-  /// The share of a row that is free along its normal, Σ r_i n̄ · F_i n̄ with the free axes F_i of
-  /// its point (r = 1) and of those that carry it: 2 if nothing is held.
-  template <class Threads>
-  PHYXEL_HD double free_share(const Threads& threads, Index r) const {
-    const Vec3<double> n = touch[r].normal;
-    double surface = 0;
-    threads.each(entries_of_row(r), [&](Offset e) {
-      const double part = carries[e].part;
-      if (part != 0) surface += part * dot(n, along_free_axes(site[near[e]], n));
-    });
-    return dot(n, along_free_axes(site[row[r].point], n)) + threads.sum(surface);
-  }
-  /// The velocity that the force of a row is to change. If only a share s < 1 of the row is free,
-  /// that is
+  /// The velocity that the force of a row is to change. If only a share s < 1 of the row is free
+  /// along its normal, s = n̄ · F_p n̄ + Σ r_k n̄ · F_k n̄ with 1 in F along free axes, that is
   ///
   ///   v' = s (F_p (v_p - Σ r_k v_k) + Σ r_k F_k (v_p - v_k)),
   ///

@@ -6,8 +6,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "phyxel/error.hpp"
+#include "phyxel/physics/contact.hpp"
 #include "support/contact_scene.hpp"
 
 namespace phyxel {
@@ -148,6 +150,20 @@ TEST(HeldOverlaps, WithObstaclesCountFromTheStart) {
   }
   Way run(end + wall + cube_at("pushed", 0.11, moved(-0.1)), step);
   EXPECT_THAT(message_of(run), HasSubstr("0.25 of a support"));
+}
+
+/// A phyxel that is free almost across the normal of an obstacle moves by no more than thrice the
+/// gap, whatever is asked of it.
+TEST(HeldOverlaps, DoNotFlingPhyxelsFreeAcrossTheNormal) {
+  for (const double across : {0.5, 0.1, 0.02}) {
+    const Vec3d normal{std::sqrt(1 - across * across), 0, across};
+    const ContactChange change = contact_change({-0.01, normal}, {.free = {0, 0, 1}}, {}, 0.1);
+    EXPECT_EQ(change.normal.x, 0);
+    EXPECT_GT(change.normal.z, 0);
+    EXPECT_LE(norm(change.normal), 3.2 * 0.1) << across;
+  }
+  const ContactChange whole = contact_change({-0.01, {0.6, 0, 0.8}}, {.free = {0, 0, 1}}, {}, 0.1);
+  EXPECT_NEAR(0.8 * whole.normal.z, 0.1, 1e-15);  // it leaves the obstacle in the step
 }
 
 TEST(HeldOverlaps, WithAFreeObstacleEndARun) {
