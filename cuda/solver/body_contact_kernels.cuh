@@ -166,14 +166,19 @@ static __global__ void find_row_rubs(PenaltyPasses passes, int rows) {
   if (threads.number() < rows) passes.find_rub(threads, threads.number());
 }
 
-/// Finds the depth of the deepest phyxel of each body in other bodies [m], of this device's points.
-/// One thread per row. @param body of each point. @param deepest zero at first
-static __global__ void find_depths(ContactPasses passes, const Index* body, int points, int rows,
-                                   double* deepest) {
+/// Finds the depth of the deepest phyxel of each body in other bodies [m], of this device's points,
+/// then the largest depth of each over the smaller range of both bodies. One thread per row.
+/// @param body of each point. @param ranges of the bodies [m], shape [bodies]
+/// @param deepest zero at first, shape [2, bodies]
+static __global__ void find_depths(ContactPasses passes, const Index* body, const double* ranges,
+                                   int bodies, int points, int rows, double* deepest) {
   const int r = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (r >= rows || !passes.touch[r].is_inside || passes.row[r].point >= points) return;
   const double depth = -passes.touch[r].gap;
-  if (depth > 0) raise_to(deepest + body[passes.row[r].point], depth);
+  if (!(depth > 0)) return;
+  const Index own = body[passes.row[r].point];
+  raise_to(deepest + own, depth);
+  raise_to(deepest + bodies + own, depth / fmin(ranges[own], ranges[passes.row[r].body]));
 }
 
 /// Changes the velocities of points by penalties as a step starts. One group of threads per point.

@@ -111,18 +111,20 @@ class DeviceBodyContacts {
     m_.launch_each("add_contact_terms", add_contact_terms<Real>, count(), places(), dt_,
                    sums_.pointer());
   }
-  /// The depths, before `push_apart`, of the deepest phyxel of each body in other bodies [m].
-  /// Waits.
+  /// The depths, before `push_apart`, of phyxels of each body in other bodies, as of
+  /// `BodyContacts::depths`. Waits.
   std::vector<double> depths() {
-    std::vector<double> deepest(m_.model().body_contact.distances.size());
+    const std::size_t bodies = m_.model().body_contact.distances.size();
+    std::vector<double> deepest(2 * bodies);
     if (!acts() || !points_.any()) return deepest;
     DeviceArray<double> all(deepest.size(), name);
     all.clear();
+    const DeviceArray<double> ranges = sent(layer_.ranges_of_bodies(), name);
     end_motion();
     if (m_.share()) refresh(motion_);
     find_touches(passes());
-    m_.launch_each("find_depths", find_depths, rows(), passes(), own().body.data(), count(), rows(),
-                   all.data());
+    m_.launch_each("find_depths", find_depths, rows(), passes(), own().body.data(), ranges.data(),
+                   static_cast<int>(bodies), count(), rows(), all.data());
     m_.launch_each("end_way", end_way, 1, way_.data());
     m_.wait();
     return fetched(all);

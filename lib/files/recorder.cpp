@@ -287,7 +287,7 @@ void Recorder::continue_after(const Continuation& point, bool overwrite) {
   keep(writes_phyxels_, "phyxels", phyxels_);
   keep(writes_surface_, "surface", surface_);
   std::vector<std::string> kept_lines;
-  for (const FrameLog* one : logs()) kept_lines.push_back(one->kept(log.last_step));
+  for (const FrameLog* one : logs()) kept_lines.push_back(one->kept(log.last_time));
   // No check follows, so that the folder is cut back as a whole or not at all.
   std::error_code ignored;
   fs::remove(directory_ / summary_name, ignored);  // it describes the end of the earlier run

@@ -19,6 +19,9 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t largest_log = std::size_t{1} << 30;
 
+/// The column of the time in the logs of frames, after that of steps, whose size may change.
+constexpr std::size_t column_of_time = 1;
+
 /// True for the name of a file of a trajectory, finished or temporary.
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
@@ -157,7 +160,7 @@ std::vector<std::string_view> lines_of(const std::string& text) {
 }
 }  // namespace
 
-std::string FrameLog::kept(double last_step) const {
+std::string FrameLog::kept(double last_time) const {
   if (!fs::exists(file_)) return {};
   const std::string text = read_text_file(file_, largest_log);
   const std::vector<std::string_view> lines = lines_of(text);
@@ -172,20 +175,21 @@ std::string FrameLog::kept(double last_step) const {
   std::string kept;
   double reached = -1;
   for (std::size_t l = 1; l < lines.size(); ++l) {
-    const double step = number_in(cell(lines[l], 0));
-    if (!(step <= last_step)) break;
-    reached = step;
+    const double time = number_in(cell(lines[l], column_of_time));
+    if (!(time <= last_time)) break;
+    reached = time;
     kept.append(lines[l]).push_back('\n');
   }
   // A log that had been removed begins again where the run went on.
-  const bool begins_later = lines.size() > 1 && number_in(cell(lines[1], 0)) > last_step;
-  if (reached < last_step && !begins_later) {
+  const bool begins_later =
+      lines.size() > 1 && number_in(cell(lines[1], column_of_time)) > last_time;
+  if (reached < last_time && !begins_later) {
     throw InputError(fmt::format(
-        "{}: ends at step {:g}, and {} goes on to step {:g}: lines are missing; it is kept; "
-        "allowed: "
-        "put them back, remove the file, or go on in another folder (--resume CHECKPOINT --out "
+        "{}: ends at t = {:g} s, and {} goes on to t = {:g} s: lines are missing; it is kept; "
+        "allowed: put them back, remove the file, or go on in another folder (--resume CHECKPOINT "
+        "--out "
         "FOLDER)",
-        file_.string(), std::max(reached, 0.0), log_name, last_step));
+        file_.string(), std::max(reached, 0.0), log_name, last_time));
   }
   return kept;
 }
@@ -214,8 +218,7 @@ KeptLog kept_log(const fs::path& file, const Continuation& point) {
   // A run that was continued in another folder has the frames since then only.
   std::int64_t kept = 0;
   for (std::size_t l = 1; l < lines.size(); ++l) {
-    const double step = number_in(cell(lines[l], 0));
-    if (!(step <= static_cast<double>(point.step))) break;
+    if (!(number_in(cell(lines[l], column_of_time)) <= point.time)) break;
     kept = static_cast<std::int64_t>(l);
   }
   kept = std::min(kept, point.frames);
@@ -235,7 +238,7 @@ KeptLog kept_log(const fs::path& file, const Continuation& point) {
   }
   const std::string_view last = lines[static_cast<std::size_t>(kept)];
   return {text.substr(0, static_cast<std::size_t>(last.data() + last.size() + 1 - text.data())),
-          kept, kept > 0 ? number_in(cell(last, 0)) : -1};
+          kept, kept > 0 ? number_in(cell(last, column_of_time)) : -1};
 }
 
 KeptSeries kept_series(const fs::path& directory, const char* family, std::int64_t frames,

@@ -42,7 +42,7 @@ void check_continuation(const std::filesystem::path& directory, const Continuati
 struct KeptLog {
   std::string text;
   std::int64_t frames = 0;  ///< Lines below the header.
-  double last_step = -1;    ///< Step of the last line; -1 if there is none.
+  double last_time = -1;    ///< Time of the last line [s]; -1 if there is none.
 };
 /// Reads the energy log up to a checkpoint.
 /// @throws InputError if the log has too few lines, or belongs to another run

@@ -110,7 +110,7 @@ Box box_of(const BodyDistances& distances) {
 struct Original {
   std::size_t body = 0;
   Surface surface;
-  LayerSupports supports;  ///< Those of all copies.
+  LayerSupports supports;  ///< Its own: its field does not depend on whether there are copies.
 };
 
 /// The rigid motion from a body to its copy. Copies have phyxels as far apart, but for rounding and
@@ -235,8 +235,6 @@ void add_body_surfaces(Model& model, const Scene& scene, std::span<const LayerSu
     for (; o < originals.size(); ++o) {
       const std::optional<RigidMotion> motion = motion_to(originals[o], surface, supports[b]);
       if (!motion) continue;
-      LayerSupports& all = originals[o].supports;
-      all = {std::min(all.least, supports[b].least), std::max(all.most, supports[b].most)};
       distances[b] = {nullptr, motion->turn, motion->place};
       break;
     }

@@ -117,8 +117,12 @@ void BodyContacts::add_depths(std::vector<double>& deepest) const {
   for (std::size_t r = 0; r < touches_.size(); ++r) {
     const Index point = points_.rows()[r].point;
     if (!touches_[r].is_inside || point >= static_cast<Index>(count())) continue;
-    double& depth = deepest[part_of(model_, phyxel(point)).body];
-    depth = std::max(depth, -touches_[r].gap);
+    const Index body = points_.bodies()[point], other = points_.rows()[r].body;
+    const std::vector<double>& ranges = layer_.ranges_of_bodies();
+    const double depth = -touches_[r].gap, share = depth / std::min(ranges[body], ranges[other]);
+    deepest[body] = std::max(deepest[body], depth);
+    double& deepest_share = deepest[ranges.size() + static_cast<std::size_t>(body)];
+    deepest_share = std::max(deepest_share, share);
   }
 }
 

@@ -186,11 +186,12 @@ class BodyContacts {
   void for_each_force(Each&& each) const {
     for (const Index p : own_active_) each(phyxel(p), totals_[p].sum());
   }
-  /// The depth of the deepest phyxel of each body in other bodies [m]. Of a share: that of this
+  /// The depth of the deepest phyxel of each body in other bodies [m], then the largest depth of
+  /// each over the smaller range of both bodies; shape [2, bodies]. Of a share: those of this
   /// rank's phyxels; collective. @param get returns the state of a phyxel
   template <class Get>
   std::vector<double> depths(Get&& get) {
-    std::vector<double> deepest(model_.body_contact.distances.size());
+    std::vector<double> deepest(2 * model_.body_contact.distances.size());
     if (!acts() || !points_.any()) return deepest;
     place(get);
     find_touches();

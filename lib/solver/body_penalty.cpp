@@ -288,13 +288,18 @@ void BodyPenalty::find_blocks() {
 }
 
 BodyPenalty::Depths BodyPenalty::depths() const {
-  Depths found{std::vector<double>(fields_.size())};
+  Depths found{std::vector<double>(2 * fields_.size())};
+  const std::vector<double>& ranges = layer_.ranges_of_bodies();
   for (std::size_t r = 0; r < touches_.size(); ++r) {
     if (!touches_[r].is_inside || !is_own(r)) continue;
     const Index p = points_.rows()[r].point;
-    double& depth = found.of_body[points_.bodies()[p]];
-    depth = std::max(depth, -touches_[r].gap);
-    found.share = std::max(found.share, -touches_[r].gap / points_.sites()[p].range);
+    const Index body = points_.bodies()[p], other = points_.rows()[r].body;
+    const double depth = -touches_[r].gap;
+    const auto keep_deeper = [](double& kept, double now) { kept = std::max(kept, now); };
+    keep_deeper(found.of_body[body], depth);
+    keep_deeper(found.of_body[fields_.size() + static_cast<std::size_t>(body)],
+                depth / std::min(ranges[body], ranges[other]));
+    keep_deeper(found.share, depth / points_.sites()[p].range);
   }
   return found;
 }

@@ -77,8 +77,8 @@ class BodyPenalty {
       if (block(0, 0) + block(1, 1) + block(2, 2) > 0) each(phyxel(p), block);
     }
   }
-  /// The depth of the deepest of this rank's points of each body in other bodies at `linearise`
-  /// [m], and as a share of its support.
+  /// The depths of this rank's points of each body in other bodies at `linearise`, as of
+  /// `BodyContacts::depths`, and the largest one as a share of the point's support.
   struct Depths {
     std::vector<double> of_body;
     double share = 0;

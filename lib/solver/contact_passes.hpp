@@ -32,6 +32,12 @@ struct PointWay {
   PHYXEL_HD double sum() const { return before + in_step; }
 };
 
+/// The components of a vector along the axes on which a phyxel is free.
+PHYXEL_HD Vec3<double> along_free_axes(const SurfaceSite& site, Vec3<double> v) {
+  const Vec3<double> m = site.mobility;
+  return {m.x > 0 ? v.x : 0.0, m.y > 0 ? v.y : 0.0, m.z > 0 ? v.z : 0.0};
+}
+
 /// The arrays of the passes. Whoever fills them runs `find_patch` and `find_touch` for all rows,
 /// `find_share` for all points on which forces may act, and `find_response` for all rows; then, in
 /// each sweep, `find_force` for all rows and `forces_on` for its own points, whose velocities it
@@ -128,12 +134,15 @@ struct ContactPasses {
   PHYXEL_HD void find_response(const Threads& threads, Index r) const {
     if (!touch[r].is_inside) return;
     const ContactRow& here = row[r];
+    const Vec3<double> n = touch[r].normal;
     Vec3<double> mobility{}, earlier{};
+    double free = 0;  // Σ r_k n̄ · F_k n̄
     threads.each(entries_of_row(r), [&](Offset e) {
       const double part = carries[e].part;
       if (part == 0) return;
       mobility += std::fabs(part) * share[near[e]] * site[near[e]].mobility;
       earlier += part * motion[near[e]].earlier;
+      free += part * dot(n, along_free_axes(site[near[e]], n));
     });
     SurfaceResponse found;
     found.mobility = (1 / site[here.point].area) *
@@ -141,13 +150,19 @@ struct ContactPasses {
     found.target = target_velocity(touch[r], relative_velocity(threads, r),
                                    motion[here.point].earlier - threads.sum(earlier), here.law,
                                    depth_recovery(site[here.point], dt), dt);
+    free = dot(n, along_free_axes(site[here.point], n)) + threads.sum(free);  // 2: nothing is held
+    constexpr double almost_one = 0.999;  // by rounding; 1 of a free point on a held surface
+    if (free < almost_one) {
+      found.free = free > 0 ? free : 0;
+      found.target *= found.free * found.free;
+    }
     if (threads.is_first()) response[r] = found;
   }
   template <class Threads>
   PHYXEL_HD void find_force(const Threads& threads, Index r) const {
     SurfaceForce found{};
     if (touch[r].is_inside) {
-      found = surface_force(touch[r], response[r], relative_velocity(threads, r), row[r].law);
+      found = surface_force(touch[r], response[r], velocity_of_free(threads, r), row[r].law);
     }
     if (threads.is_first()) force[r] = found;
   }
@@ -206,6 +221,27 @@ struct ContactPasses {
     });
     return velocity[row[r].point] - threads.sum(surface);
   }
+  /// The velocity that the force of a row is to change. If only a share s < 1 of the row is free
+  /// along its normal, s = n̄ · F_p n̄ + Σ r_k n̄ · F_k n̄ with 1 in F along free axes, that is
+  ///
+  ///   v' = s (F_p (v_p - Σ r_k v_k) + Σ r_k F_k (v_p - v_k)),
+  ///
+  /// so that the few phyxels that are free follow the point, and no faster, by a force that is no
+  /// larger than one on a free point: they cannot make good what held ones would have to do.
+  template <class Threads>
+  PHYXEL_HD Vec3<double> velocity_of_free(const Threads& threads, Index r) const {
+    const Vec3<double> whole = relative_velocity(threads, r);
+    const double free = response[r].free;
+    if (free == 1) return whole;
+    const Index p = row[r].point;
+    Vec3<double> surface{};
+    threads.each(entries_of_row(r), [&](Offset e) {
+      const double part = carries[e].part;
+      const Index k = near[e];
+      if (part != 0) surface += part * along_free_axes(site[k], velocity[p] - velocity[k]);
+    });
+    return free * (along_free_axes(site[p], whole) + threads.sum(surface));
+  }
 };
 
 /// The passes of contact by penalties. At the start of a step, where points are both before and
@@ -226,7 +262,7 @@ struct PenaltyPasses : ContactPasses {
   PHYXEL_HD void find_rub(const Threads& threads, Index r) const {
     if (!touch[r].is_inside) return;
     SurfaceForce found{.push = force[r].push};
-    add_friction(touch[r], response[r], relative_velocity(threads, r), row[r].law, found);
+    add_friction(touch[r], response[r], velocity_of_free(threads, r), row[r].law, found);
     if (threads.is_first()) force[r] = found;
   }
   /// The energy of a row whose `find_push` has been run [J].

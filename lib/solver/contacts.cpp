@@ -9,6 +9,7 @@
 #include "model/rigid_tips.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/held_overlaps.hpp"
 #include "phyxel/physics/obstacles.hpp"
 #include "rank_sums.hpp"
 #include "solver/contact_penalty.hpp"
@@ -30,7 +31,7 @@ Vec3d vector_of(std::span<const ExactSum> sums) {
 struct ContactRates {
   StepSums sums;
   double span = 1;             ///< [s]
-  std::vector<double> depths;  ///< As of `NextStep`.
+  std::vector<double> depths;  ///< As of `NextStep`; empty if they are not known.
 };
 
 /// What obstacles do at the present state of a solver: in the next step of Verlet's method, or by
@@ -76,11 +77,29 @@ ContactRates rates_now(const Model& model, Backend& backend, const Solver& solve
   return rates;
 }
 
-/// Depths of the deepest phyxel of the contact layer in each obstacle [m], 0 if none is inside. Of
-/// a share: collective.
-std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver,
-                                        const State& state) {
-  std::vector<double> depths(model.obstacles.size());
+/// How deep phyxels are: the largest depth, and the largest share of a support.
+struct Depth {
+  double depth = 0;  ///< [m]
+  double share = 0;
+
+  void keep(double other, double support) {
+    depth = std::max(depth, other);
+    share = std::max(share, other / support);
+  }
+};
+
+/// The larger depths of all ranks. Collective.
+Depth of_all_ranks(const Model& model, const Depth& own) {
+  if (!model.share) return own;
+  const Communicator& ranks = *model.share->communicator;
+  return {ranks.largest(own.depth), ranks.largest(own.share)};
+}
+
+/// Depths of the phyxels of the contact layer in each obstacle, 0 if none is inside. Of a share:
+/// collective.
+std::vector<Depth> depths_in_obstacles(const Model& model, const Solver& solver,
+                                       const State& state) {
+  std::vector<Depth> depths(model.obstacles.size());
   if (depths.empty()) return depths;
   const double share = solver.steps() > 0 ? 1 : 0;
   const PlacedObstacles after = solver.method() == Method::equilibrium
@@ -92,11 +111,10 @@ std::vector<double> depths_in_obstacles(const Model& model, const Solver& solver
       after.empty() ? obstacles_now(model, solver.time(), 0, state.rigid) : after;
   for (std::size_t o = 0; o < depths.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
-    double& deepest = depths[o];
-    layer.for_each_inside(obstacle, now[o], [&](std::size_t, Vec3d, const Gap& gap) {
-      deepest = std::max(deepest, -gap.distance);
+    layer.for_each_inside(obstacle, now[o], [&](std::size_t k, Vec3d, const Gap& gap) {
+      depths[o].keep(-gap.distance, model.neighbourhood.support[model.contact.phyxels[k]]);
     });
-    if (model.share) deepest = model.share->communicator->largest(deepest);
+    depths[o] = of_all_ranks(model, depths[o]);
   }
   return depths;
 }
@@ -151,35 +169,54 @@ void check_rigid(const Model& model, std::span<const RigidState> rigid) {
   }
 }
 
+/// The depth at which a run ends, in supports: of phyxels in obstacles, and in other bodies.
+constexpr double in_obstacle = 0.25, in_body = 1;
+
+/// Refuses phyxels that supports have led deep into something that cannot give way, either.
+void check_held(const Model& model, const HeldOverlaps& overlaps) {
+  const auto check = [&](const HeldOverlap& overlap, double allowed, const std::string& where) {
+    if (!(overlap.share() > allowed)) return;
+    say_wrong(model,
+              fmt::format("phyxels of body \"{}\" that supports hold or move are {:.3g} m deep in "
+                          "{}, {:.3g} m is allowed, {} of a support: supports press into each "
+                          "other what cannot give way; allowed: motions (body.motion, "
+                          "obstacle.motion) that leave them room",
+                          name_of_body(model, overlap.body), overlap.depth, where,
+                          allowed * overlap.support, allowed));
+  };
+  for (const HeldOverlap& overlap : overlaps.of_bodies) {
+    if (overlap.depth == 0) continue;
+    check(overlap, in_body,
+          fmt::format("held ones of body \"{}\"", name_of_body(model, overlap.other)));
+  }
+  for (std::size_t o = 0; o < overlaps.of_obstacles.size(); ++o) {
+    check(overlaps.of_obstacles[o], in_obstacle,
+          fmt::format("obstacle \"{}\"", model.obstacles[o].name));
+  }
+}
+
 /// Refuses readings of phyxels that an obstacle has left inside another one, or that it cannot
 /// hold.
 void check_depths(const Model& model, const std::vector<ContactReading>& readings) {
-  constexpr double in_obstacle = 0.25, in_body = 1;
-  const double support = smallest_support(model);
   for (const ContactReading& reading : readings) {
     const bool is_body = reading.shape == body_shape;
-    const double deepest = (is_body ? in_body : in_obstacle) * support;
-    if (!(reading.depth > deepest)) continue;
+    const double allowed = is_body ? in_body : in_obstacle;
+    if (!(reading.depth_share > allowed)) continue;
     const std::string whose = is_body ? fmt::format(" of body \"{}\"", reading.obstacle) : "";
     const std::string where = !is_body ? fmt::format("obstacle \"{}\"", reading.obstacle)
                               : model.body_contact.self ? "other bodies or other parts of it"
                                                         : "other bodies";
-    say_wrong(model, fmt::format(
-                         "phyxels{} are {:.3g} m deep in {}, {:.3g} m is allowed, {} of a support: "
-                         "something presses them into it, or they are too fast for the step{}",
-                         whose, reading.depth, where, deepest, is_body ? in_body : in_obstacle,
-                         has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
+    say_wrong(model,
+              fmt::format("phyxels{} are up to {:.3g} m deep in {}, {:.3g} of {}, {} of it is "
+                          "allowed: something presses them into it, or they are too fast for the "
+                          "step{}",
+                          whose, reading.depth, where, reading.depth_share,
+                          is_body ? "the smaller support of both" : "their support", allowed,
+                          has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
   }
 }
 
 }  // namespace
-
-double trusted_depth_in_bodies(const Model& model) {
-  // Surfaces of bodies are looked at from half a spacing inside: what is deeper than a spacing may
-  // be led out on the wrong side.
-  constexpr double spacing = 0.45;  // over a support
-  return model.body_contact.acts() ? spacing * smallest_support(model) : 0;
-}
 
 void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
                           std::span<const RigidState> rigid) {
@@ -233,6 +270,8 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver) {
   check_fits(model, backend);
   if (touching_count(model) == 0) return {};
+  const HeldOverlaps held = find_held_overlaps(model, solver, backend.rigid_states());
+  check_held(model, held);
   State state;
   ContactRates rates = rates_now(model, backend, solver, state);
   add_over_ranks(model, rates.sums);
@@ -254,23 +293,37 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
     reading.impact_loss = sums[ContactTerms::impact_loss].value();
     readings.push_back(std::move(reading));
   };
-  const std::vector<double> depths = depths_in_obstacles(model, solver, state);
+  const std::vector<Depth> depths = depths_in_obstacles(model, solver, state);
   for (std::size_t o = 0; o < model.obstacles.size(); ++o) {
     const Obstacle& obstacle = model.obstacles[o];
     add({.obstacle = obstacle.name,
          .shape = shape_name(obstacle),
-         .depth = depths[o],
+         .depth = depths[o].depth,
+         .depth_share = depths[o].share,
          .place = obstacle.place});
   }
-  for (std::size_t b = 0; b < model.body_contact.distances.size(); ++b) {
+  const std::size_t bodies = model.body_contact.distances.size();
+  for (std::size_t b = 0; b < bodies; ++b) {
     const Part& part = first_part(model, b);
-    const double depth = b < rates.depths.size() ? rates.depths[b] : 0;
+    Depth depth;
+    if (!rates.depths.empty()) depth = {rates.depths[b], rates.depths[bodies + b]};
+    depth = of_all_ranks(model, depth);
     add({.obstacle = part.name,
          .shape = body_shape,
-         .depth = model.share ? model.share->communicator->largest(depth) : depth,
+         .depth = depth.depth,
+         .depth_share = depth.share,
          .place = part.centre});
   }
   check_depths(model, readings);
+  const auto add_held = [&](const std::vector<HeldOverlap>& overlaps, std::size_t first) {
+    for (std::size_t k = 0; k < overlaps.size(); ++k) {
+      ContactReading& reading = readings[first + k];
+      reading.depth = std::max(reading.depth, overlaps[k].depth);
+      reading.depth_share = std::max(reading.depth_share, overlaps[k].share());
+    }
+  };
+  add_held(held.of_obstacles, 0);
+  add_held(held.of_bodies, model.obstacles.size());
   return readings;
 }
 

@@ -13,7 +13,7 @@ namespace phyxel {
 /// What bodies and obstacles do over the step from an instant, on this rank.
 struct NextStep {
   StepSums sums;               ///< As `StepContacts` and `BodyContacts` would add them.
-  std::vector<double> depths;  ///< Now, of the deepest phyxel of each body in other bodies [m].
+  std::vector<double> depths;  ///< Now, as of `BodyContacts::depths`.
   /// Forces of other bodies on phyxels of this rank that the forces of the instant do not contain
   /// [N], shape [n]; empty if bodies do not touch each other. Those on held phyxels change no
   /// motion, and their supports bear them.

@@ -10,6 +10,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
 #include "phyxel/solver.hpp"
+#include "solver/body_momenta.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/following_loads.hpp"
 #include "solver/host_threads.hpp"
@@ -112,11 +113,16 @@ void Solver::change_step(std::int64_t steps, double dt) {
   State state = this->state();
   const Vectors before = accelerations.at(state, HistoryUse::trial),
                 elastic = accelerations.at(state, HistoryUse::frozen);
-  const PresentContact contact = present_contact(*model_, backend_, state, time(), dt_);
-  const auto pushed = [&](Index i, Vec3d acceleration) {  // by penalties, too
-    if (contact.force.empty()) return acceleration;
-    return acceleration + accelerations.free(i, (1 / model_->mass[i]) * contact.force[i]);
+  // Penalties push, too, from where phyxels are.
+  const auto add_contact = [&](Vectors& acceleration) {
+    const PresentContact contact = present_contact(*model_, backend_, state, time(), dt_);
+    for (std::size_t i = 0; i < contact.force.size(); ++i) {
+      acceleration[i] +=
+          accelerations.free(static_cast<Index>(i), (1 / model_->mass[i]) * contact.force[i]);
+    }
   };
+  Vectors pushed = before;
+  add_contact(pushed);
   Vectors v(before.size());  // at t
   const auto for_each = [&](auto&& each) {
     for (const Part& part : model_->parts) {
@@ -125,7 +131,7 @@ void Solver::change_step(std::int64_t steps, double dt) {
   };
   for_each([&](Index i, double damping) {
     const DampedFlow flow = damped_flow(damping, dt_ / 2);
-    v[i] = accelerations.free(i, flow.keep * state.velocity[i] + flow.gain * pushed(i, before[i]));
+    v[i] = accelerations.free(i, flow.keep * state.velocity[i] + flow.gain * pushed[i]);
   });
   const Vectors rates = accelerations.derivatives(state, elastic, v);
   const Vectors along_itself = accelerations.derivatives(state, elastic, elastic),
@@ -136,14 +142,18 @@ void Solver::change_step(std::int64_t steps, double dt) {
                          std::max(accelerations.growth(elastic, along_itself),
                                   accelerations.growth(rates, along_rates));
   const StepChange change = fastest < 1 ? step_change(dt_, dt) : StepChange{};
+  const Vectors displacement = state.displacement, velocity = v;
   for_each([&](Index i, double) {
     state.displacement[i] += change.first * elastic[i] + change.displacement * along_itself[i];
     v[i] += change.velocity * along_rates[i] - change.first * rates[i];
   });
-  const Vectors after = accelerations.at(state, HistoryUse::trial);
+  // Derivatives are differences of forces, whose torques vanish where these act alone.
+  BodyMomenta(*model_).keep({displacement, velocity}, state.displacement, v);
+  Vectors after = accelerations.at(state, HistoryUse::trial);
+  add_contact(after);
   for_each([&](Index i, double damping) {
     // Prescribed velocities stay what they are.
-    const Vec3d earlier = velocity_before(v[i], pushed(i, after[i]), damping, dt / 2);
+    const Vec3d earlier = velocity_before(v[i], after[i], damping, dt / 2);
     state.velocity[i] += accelerations.free(i, earlier - state.velocity[i]);
   });
   for (RigidState& body : state.rigid) body.velocity += ((dt_ - dt) / 2) * model_->gravity;

@@ -79,12 +79,21 @@ SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
   for (std::size_t k = 0; k < sites_.size(); ++k) {
     look_around(sites_[k], model.body_contact.distances[bodies_[k]].view());
   }
-  double least = HUGE_VAL;
-  for (const SurfaceSite& site : sites_) least = std::min(least, site.range);
+  ranges_.assign(model.body_contact.distances.size(), HUGE_VAL);
+  const auto keep_smaller = [](double& kept, double other) { kept = std::min(kept, other); };
+  for (std::size_t k = 0; k < sites_.size(); ++k)
+    keep_smaller(ranges_[bodies_[k]], sites_[k].range);
+  if (model.share) {
+    const Communicator& ranks = *model.share->communicator;
+    for (const std::vector<double>& some :
+         exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), ranges_))) {
+      for (std::size_t b = 0; b < ranges_.size(); ++b) keep_smaller(ranges_[b], some[b]);
+    }
+  }
+  least_range_ = HUGE_VAL;
+  for (const double range : ranges_) keep_smaller(least_range_, range);
   groups_ = groups_of(model, model.body_contact.layer);
   for (const LayerGroup& group : groups_) body_of_group_.push_back(bodies_[group.begin]);
-  if (model.share) least = model.share->communicator->smallest(least);
-  least_range_ = least;
 }
 
 std::vector<double> SurfaceLayer::gains(double dt) const {

@@ -39,6 +39,8 @@ class SurfaceLayer {
   const std::vector<LayerGroup>& groups() const { return groups_; }
   /// The body of each group.
   const std::vector<Index>& bodies_of_groups() const { return body_of_group_; }
+  /// The smallest range of the phyxels of each body of the scene [m]; infinity without any.
+  const std::vector<double>& ranges_of_bodies() const { return ranges_; }
   /// The smallest and the largest skin [m]: contact lists stay valid until phyxels have moved by it
   /// against each other.
   double least_skin() const { return 0.25 * least_range_; }
@@ -69,7 +71,8 @@ class SurfaceLayer {
   std::vector<Index> bodies_;
   std::vector<LayerGroup> groups_;
   std::vector<Index> body_of_group_;
-  double least_range_ = 0;  // of all phyxels [m]
+  std::vector<double> ranges_;  // as of `ranges_of_bodies`
+  double least_range_ = 0;      // of all phyxels [m]
 };
 
 }  // namespace phyxel

@@ -48,5 +48,36 @@ TEST_F(Mpirun, AFreeBodyInTheFloorIsRefusedOnce) {
       << outcome.err;
 }
 
+/// Two cubes with a gap of 0.01 m, the first one held, the second one moved by `way` [m] against
+/// it.
+std::string pressed(const std::string& way) {
+  const auto cube = [](const std::string& name, const std::string& x, const std::string& support) {
+    return "[[body]]\nname = '" + name + "'\nshape = 'block'\nsize = [0.2, 0.2, 0.2]\n" +
+           "spacing = 0.05\nlattice = 'nodes'\ntranslation = [" + x + ", 0.01, 0]\n" +
+           "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n" + support +
+           "all = true\n";
+  };
+  return "[time]\nend = 0.1\n[contact]\n[output]\nframes_per_second = 200\n" +
+         cube("anvil", "-0.1", "[[body.fixed]]\n") +
+         cube("hammer", "0.11",
+              "[[body.motion]]\ndisplacement = [" + way + ", 0, 0]\nduration = 0.1\n");
+}
+
+TEST_F(Mpirun, BodiesHeldAsWholesThatOverlapAreToldOnce) {
+  write("deep.toml", pressed("-0.15"));
+  write("scene.toml", pressed("-0.04"));
+  for (const int ranks : {0, 2, 3}) {
+    const std::string on = std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "deep.toml", "--out", "deep" + on});
+    EXPECT_EQ(outcome.code, 3);
+    EXPECT_EQ(count_of("that supports hold or move are", outcome.err), 1) << outcome.err;
+    const Outcome warned = run_on(ranks, {"run", "scene.toml", "--out", "out" + on});
+    ASSERT_EQ(warned.code, 0) << warned.err;
+    EXPECT_THAT(test::text_of(folder_ / ("out" + on) / "run.json"),
+                HasSubstr("which supports hold or move as a whole, was 0.03 m deep in body"));
+    if (ranks > 0) expect_same_files("out0", "out" + on);
+  }
+}
+
 }  // namespace
 }  // namespace phyxel

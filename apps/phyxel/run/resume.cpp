@@ -40,7 +40,7 @@ std::optional<CheckpointReader> Run::find_checkpoint() {
   replace_ = options_.force;
   CheckpointReader checkpoint(file);
   resumed_from_ = file;
-  continuation_ = {checkpoint.info().frames_written, checkpoint.state(0, 0).step,
+  continuation_ = {checkpoint.info().frames_written, checkpoint.state(0, 0).time,
                    checkpoint.info().watched.start_energy, file};
   if (!options_.dry_run) check_continuation(folder, *continuation_, options_.force);
   const Precision precision = checkpoint.info().precision;

@@ -105,7 +105,6 @@ void Run::execute() {
       begin_ ? begin_->info.watched
              : Watched{now_.total_energy(), now_.largest_speed, now_.kinetic_and_elastic_energy()};
   peak_energy_ = std::max(watched_.peak_energy, now_.kinetic_and_elastic_energy());
-  trusted_depth_ = trusted_depth_in_bodies(model());
   readings_ = read_off();
   if (finished) checkpoint_ = resumed_from_;
   if (!finished) step_to_end();
@@ -206,9 +205,12 @@ Readings Run::read_off() {
         find_reactions(model(), *backend_, solver_), probes_.read(*backend_, recovery_.get()),
         read_gases(model(), *backend_, solver_), find_contacts(model(), *backend_, solver_),
         read_rigid_bodies(model(), *backend_, solver_)};
+    held_.keep_wholes(find_held_overlaps(model(), solver_, backend_->rigid_states()));
     deepest_.resize(found.contacts.size());
+    deepest_shares_.resize(found.contacts.size());
     for (std::size_t k = 0; k < deepest_.size(); ++k) {
       deepest_[k] = std::max(deepest_[k], found.contacts[k].depth);
+      deepest_shares_[k] = std::max(deepest_shares_[k], found.contacts[k].depth_share);
     }
     return found;
   });

@@ -11,6 +11,7 @@
 #include "device_option.hpp"
 #include "file_writer.hpp"
 #include "mpi/watchdog.hpp"
+#include "phyxel/held_overlaps.hpp"
 #include "phyxel/phyxel.hpp"
 #include "program_ranks.hpp"
 #include "progress.hpp"
@@ -205,13 +206,14 @@ class Run {
   Diagnostics start_diagnostics_, now_;
   /// Depth of the deepest phyxel in each obstacle at the frames of this run [m].
   std::vector<double> deepest_;
+  std::vector<double> deepest_shares_;     // the same as shares of supports
+  HeldOverlaps held_;                      // of bodies held as wholes, the deepest ones of frames
   Readings readings_;                      // of the start, or the last frame
   std::optional<Recorder> recorder_;       // on the first rank
   std::string transport_;                  // transport between ranks
   std::vector<int> gpus_;                  // GPU of each rank
   std::shared_ptr<const GoodState> good_;  // last good state
   Watched watched_;                        // for checkpoints: start and frames
-  double trusted_depth_ = 0;               // in other bodies [m]
   double peak_energy_ = 0;                 // largest energy of the checked states [J]
   double setup_seconds_ = 0, step_seconds_ = 0, loop_seconds_ = 0;  // loop includes output
   Clock::time_point loop_start_;

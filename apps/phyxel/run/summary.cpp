@@ -233,18 +233,25 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
     }
   }
   warn_of_energy("contact of bodies with each other", of_bodies);
-  const auto first_body = deepest_.begin() + static_cast<std::ptrdiff_t>(std::min(
-                                                 model().obstacles.size(), deepest_.size()));
-  if (first_body == deepest_.end()) return warnings;
-  const auto deepest = std::max_element(first_body, deepest_.end());
-  if (*deepest > trusted_depth_) {
+  if (std::string warning = warning_of_held_overlaps(model(), held_); !warning.empty()) {
+    warnings.push_back(std::move(warning));
+  }
+  const std::span<const double> shares =
+      std::span(deepest_shares_)
+          .subspan(std::min(model().obstacles.size(), deepest_shares_.size()));
+  if (shares.empty()) return warnings;
+  const auto deepest = std::max_element(shares.begin(), shares.end());
+  if (*deepest > trusted_share_in_bodies) {
+    const std::size_t k = deepest_.size() - static_cast<std::size_t>(shares.end() - deepest);
     warnings.push_back(fmt::format(
-        "phyxels of body \"{}\" were {:.3g} m deep in other bodies, {} bodies had some deeper than "
-        "{:.3g} m, a distance between phyxels: contact may have led them out on the wrong side; "
-        "smaller speeds, stiffer bodies, more sweeps or a smaller time.safety may help",
-        readings_.contacts[static_cast<std::size_t>(deepest - deepest_.begin())].obstacle, *deepest,
-        std::count_if(first_body, deepest_.end(), [&](double d) { return d > trusted_depth_; }),
-        trusted_depth_));
+        "phyxels of body \"{}\" were {:.3g} m deep in other bodies, {:.3g} of the smaller support "
+        "of both, {} bodies had some deeper than {} of it, a distance between phyxels: contact may "
+        "have led them out on the wrong side; smaller speeds, stiffer bodies, more sweeps or a "
+        "smaller time.safety may help",
+        readings_.contacts[k].obstacle, deepest_[k], *deepest,
+        std::count_if(shares.begin(), shares.end(),
+                      [](double share) { return share > trusted_share_in_bodies; }),
+        trusted_share_in_bodies));
   }
   return warnings;
 }

@@ -30,7 +30,7 @@ struct Exchanges {
 struct NextContacts {
   /// Words of exact sums, as of `Backend::step_sums` without those of motions.
   std::vector<std::int64_t> sums;
-  std::vector<double> depths;  ///< Now, of the deepest phyxel of each body in other bodies [m].
+  std::vector<double> depths;  ///< Now, as of `BodyContacts::depths`, shape [2, bodies].
   /// Forces of other bodies on each phyxel that a step finds only at its end [N], shape [n]; empty
   /// if bodies do not touch each other.
   std::vector<Vec3d> of_bodies;

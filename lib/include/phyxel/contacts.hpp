@@ -22,7 +22,9 @@ struct ContactReading {
   double friction_heat = 0;  ///< What friction has turned into heat since t = 0 [J].
   double impact_loss = 0;    ///< What surface points have lost in impacts since t = 0 [J].
   double depth = 0;          ///< Of the phyxel of a surface that is deepest inside, now [m].
-  Vec3d place;               ///< The obstacle's place at rest [m].
+  /// The largest depth over the phyxel's support, now, or over the smaller support of both bodies.
+  double depth_share = 0;
+  Vec3d place;  ///< The obstacle's place at rest [m].
 };
 
 /// Where a free rigid body is and how it moves, at the time of the solver.
@@ -41,9 +43,10 @@ struct RigidReading {
 std::vector<RigidReading> read_rigid_bodies(const Model& model, const Backend& backend,
                                             const Solver& solver);
 
-/// The depth of a phyxel in another body [m] beyond which contact may lead it out on the wrong
-/// side: a distance between phyxels; 0 where no bodies touch. Of a share: collective.
-double trusted_depth_in_bodies(const Model& model);
+/// The depth of a phyxel in another body beyond which contact may lead it out on the wrong side, as
+/// of `ContactReading::depth_share`: a distance between phyxels. Surfaces of bodies are looked at
+/// from half of that inside.
+inline constexpr double trusted_share_in_bodies = 0.45;
 
 /// A number of such a reading: a column of `rigid.csv`.
 struct RigidColumn {
@@ -62,8 +65,8 @@ const char* shape_name(const Obstacle& obstacle);
 /// found from one evaluation of the forces, without taking it. Sums are exact: they do not depend
 /// on the number of threads and ranks. Of a share: those of the whole model; collective, for a
 /// solver that was made with the model.
-/// @throws DivergedError if a phyxel is deeper in an obstacle than a quarter of a support, or in
-/// another body than a support
+/// @throws DivergedError if a phyxel is deeper in an obstacle than a quarter of its support, or in
+/// another body than the smaller support of both bodies
 std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver);
 

@@ -91,10 +91,10 @@ class FrameLog {
   /// @param header first line, with its end
   FrameLog(std::filesystem::path file, std::string header)
       : file_(std::move(file)), header_(std::move(header)) {}
-  /// Reads the lines of steps up to `last_step`, below the header. A folder without the file, of an
+  /// Reads the lines up to `last_time` [s], below the header. A folder without the file, of an
   /// earlier version of the program, has none. @throws InputError if it has another header, or ends
-  /// before that step
-  std::string kept(double last_step) const;
+  /// before that time
+  std::string kept(double last_time) const;
   /// Writes the file anew. @param lines below the header
   void create(const std::string& lines = {});
   /// Adds lines at the end. @throws OutputError
@@ -111,7 +111,8 @@ class FrameLog {
 /// The point at which a trajectory is continued, from a checkpoint.
 struct Continuation {
   std::int64_t frames = 0;  ///< Number of frames written before.
-  std::int64_t step = std::numeric_limits<std::int64_t>::max();  ///< Step of the checkpoint.
+  /// Time of the checkpoint [s]. Steps do not tell which frame was first: they change their size.
+  double time = std::numeric_limits<double>::infinity();
   /// Total energy of the run's first state [J]; not compared if NaN.
   double initial_energy = std::numeric_limits<double>::quiet_NaN();
   /// The checkpoint. If it is outside the output folder, that folder must have no trajectory,

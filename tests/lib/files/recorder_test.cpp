@@ -254,7 +254,7 @@ TEST_F(Recording, ReactionsHaveOneLineAFrameAndSetAndAreCutBackToTheCheckpoint) 
     }
   };
   write("out/reactions.csv", log.substr(0, log.find("20,0.2")));
-  expect_refused("reactions.csv: ends at step 10, and energy.csv goes on to step 20");
+  expect_refused("reactions.csv: ends at t = 0.1 s, and energy.csv goes on to t = 0.2 s");
   write("out/reactions.csv", "step,force\n");
   expect_refused("reactions.csv: begins with \"step,force\"");
 }
@@ -276,6 +276,28 @@ TEST_F(Recording, ResumingCutsBackToTheCheckpointAndGoesOnTheSame) {
   EXPECT_EQ(text_of(folder_ / "out" / "phyxels.hdf.series"), series);
   EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), log);
   EXPECT_EQ(text_of(folder_ / "out" / "surface_000004.hdf"), last);
+}
+
+/// The number of a step falls where the step is doubled: times tell which frames were first.
+TEST_F(Recording, ResumingCutsBackToTheTimeOfACheckpointAfterTheStepHasGrown) {
+  const auto record_as = [&](Recorder& recorder, int k, std::int64_t step) {
+    const test::TwoBodiesFrame data(model_, k);
+    Frame frame = data.frame();
+    frame.diagnostics.step = step;
+    recorder.write(frame);
+  };
+  {
+    Recorder recorder(model_, scene_, false);
+    for (int k = 0; k < 3; ++k) record(recorder, k);
+    record_as(recorder, 3, 15);
+    record_as(recorder, 4, 20);
+  }
+  const std::string log = text_of(folder_ / "out" / "energy.csv");
+  Recorder resumed(model_, scene_, false, Continuation{.frames = 4, .time = 0.1 * 3});
+  EXPECT_EQ(resumed.frames_written(), 4);
+  EXPECT_FALSE(fs::exists(folder_ / "out" / "phyxels_000004.hdf"));
+  record_as(resumed, 4, 20);
+  EXPECT_EQ(text_of(folder_ / "out" / "energy.csv"), log);
 }
 
 TEST_F(Recording, ResumingIntoAnotherFolderNumbersOn) {

@@ -300,6 +300,34 @@ TEST(BodyContacts, HaveTheSameBitsOnAnyThreadsAndAfterARestart) {
   }
 }
 
+/// Copies of a body share the field of distances of the first one, as it is without them: a later
+/// copy changes no bit. An earlier one changes the rounding of places alone, unless it is turned,
+/// which turns the nodes of the field.
+TEST(BodyContacts, DoNotDependOnCopiesFarAway) {
+  const std::string far = "translation = [5, 4, 3]\n", turned = far + "rotation = [10, 20, 30]\n";
+  const std::string left = body("left", ball_shape,
+                                "translation = [-0.105, 0, 0]\nvelocity = [1, 0, 0]\n"),
+                    right = body("right", ball_shape,
+                                 "translation = [0.105, 0.05, 0.01]\nvelocity = [-1, 0, 0]\n"),
+                    copy = body("copy", ball_shape, far),
+                    turned_copy = body("copy", ball_shape, turned);
+  const std::string start = end + "[contact]\nfriction = 0.4\n";
+  Way alone(start + left + right, dt), later(start + left + right + turned_copy, dt),
+      earlier(start + copy + left + right, dt);
+  for (Way* way : {&alone, &later, &earlier}) way->solver.step(200);
+  EXPECT_GT(norm(alone.contacts()[0].impulse), 0.1);
+  const State expected = alone.solver.state(), with_later = later.solver.state(),
+              with_earlier = earlier.solver.state();
+  const auto copied = static_cast<std::size_t>(earlier.model.parts[0].end);
+  double off = 0;
+  for (std::size_t i = 0; i < expected.velocity.size(); ++i) {
+    EXPECT_EQ(with_later.velocity[i], expected.velocity[i]);
+    EXPECT_EQ(with_later.displacement[i], expected.displacement[i]);
+    off = std::max(off, norm(with_earlier.velocity[copied + i] - expected.velocity[i]));
+  }
+  EXPECT_LE(off, 1e-9);  // of 1 m/s
+}
+
 /// The states after a step of contact between places. @param found_at where points are found
 std::vector<SurfaceState> after_contact(const Model& model, const std::vector<Vec3d>& found_at,
                                         const std::vector<Vec3d>& places) {

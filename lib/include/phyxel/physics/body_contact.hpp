@@ -373,6 +373,9 @@ struct SurfaceResponse {
   /// Change of the relative velocity by a force over a step, along each axis [m/s/N].
   Vec3<double> mobility;
   double target = 0;  ///< Velocity along n̄ that the step shall end with at least [m/s].
+  /// Share of what a force on the point moves that is free (`ContactPasses::velocity_of_free`), if
+  /// supports hold most of it: then only velocities along free axes count. Else 1.
+  double free = 1;
 };
 
 /// The change of a velocity along a unit vector by a force along it. @param mobility of each axis

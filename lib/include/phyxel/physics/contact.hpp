@@ -62,7 +62,8 @@ PHYXEL_HD Vec3<double> friction_change(Vec3<double> velocity, Vec3<double> norma
 ///   Δv_n = max(-g/Δt, -(1 + e) n · v⁻) n,   Δv_t = -v_t/|v_t| min(μ Δv_n, |v_t|),
 ///
 /// where v⁻ is the relative velocity before the step, and v_t the tangential one after all other
-/// forces. Along prescribed axes nothing changes.
+/// forces. Along prescribed axes nothing changes. Where n is almost along those, a step makes good
+/// a part of the gap alone, since the free axes would have to move by far more than the gap.
 /// @param gap with a negative distance. @param dt size of the step [s]
 PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point,
                                        const ContactLaw& law, double dt) {
@@ -75,7 +76,8 @@ PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point
     const double rebound = (1 + law.restitution) * approach;
     rate = rate < rebound ? rebound : rate;
   }
-  const double push = rate / share;  // force times Δt/m
+  constexpr double least = 0.1;
+  const double push = rate / (share > least ? share : least);  // force times Δt/m
   ContactChange change{push * way, {}};
   if (!(law.static_friction > 0)) return change;
   change.tangential = friction_change(point.velocity + change.normal, n, point.free, push, law);
