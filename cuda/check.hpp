@@ -11,7 +11,15 @@
 #include <utility>
 #include <vector>
 
+#include "phyxel/error.hpp"
+
 namespace phyxel {
+
+/// An error of a device whose memory is used up.
+class DeviceMemoryError : public DeviceError {
+ public:
+  using DeviceError::DeviceError;
+};
 
 /// Checks the result of a call. @throws DeviceError naming `call` and the device
 void check_cuda(cudaError_t error, const char* call);
@@ -37,7 +45,7 @@ void wait_for_device(const Launch& last);
 
 namespace detail {
 /// Allocates device memory; the result is not null for `bytes` > 0.
-/// @throws DeviceError naming the purpose, the requested and the free memory
+/// @throws DeviceMemoryError naming the purpose, the requested and the free memory
 void* allocate(std::size_t bytes, const std::string& what);
 /// Copies between the host and the device, and waits for the copy.
 void copy(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind);

@@ -203,9 +203,9 @@ void* allocate(std::size_t bytes, const std::string& what) {
     cudaGetLastError();
     std::size_t free = 0, total = 0;
     cudaMemGetInfo(&free, &total);
-    throw DeviceError(current_device() + ": out of memory: " + what + " asks for " +
-                      gigabytes(bytes) + ", " + gigabytes(free) + " of " + gigabytes(total) +
-                      " are free");
+    throw DeviceMemoryError(current_device() + ": out of memory: " + what + " asks for " +
+                            gigabytes(bytes) + ", " + gigabytes(free) + " of " + gigabytes(total) +
+                            " are free");
   }
   check_cuda(error, "cudaMalloc");
   return data;

@@ -209,7 +209,8 @@ void add_functions(py::module_& module) {
       "device"_a = "auto",
       "Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with\n"
       "exactly so many phyxels. progress(stage, share) is called meanwhile. A GPU (`device`:\n"
-      "auto, cpu, cuda, cuda:0, ...) helps with 20,000 phyxels and more; the cloud is the same.\n\n"
+      "auto, cpu, cuda, cuda:0, ...) helps with 20,000 phyxels and more; the cloud is the same.\n"
+      "Programs that fork later should name \"cpu\", as CUDA does not survive a fork.\n\n"
       "grading: a dictionary with the keys of a scene's `[body.grading]`; finer regions are\n"
       "dictionaries, {\"ball\": (centre, radius), \"by\": 4} or {\"box\": (low, high)} [m].");
   module.def("shape", &make, "name"_a, py::kw_only(), "size"_a = Vec3d{}, "radius"_a = 0.0,

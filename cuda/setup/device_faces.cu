@@ -8,7 +8,7 @@ namespace {
 
 constexpr const char* name = "points on a surface";
 
-/// What is known of a candidate.
+/// The state of a candidate.
 enum State : char { open, accepted, refused };
 
 /// The places of candidates in the order of their ranks, after those of points accepted before.
@@ -48,7 +48,7 @@ DeviceArray<Index> decided(const DeviceArray<Index>& left, const TableView& tabl
              const Vec3d place = point[i];
              bool waits = false, is_near = false;
              table.visit_ball(place, gap, [&](const auto& entry) {
-               if (entry.index >= i) return;
+               if (is_near || entry.index >= i) return;
                const Vec3d d = entry.position - place;
                if (!(dot(d, d) < gap * gap)) return;
                const char other = state[entry.index];

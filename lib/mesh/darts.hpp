@@ -21,7 +21,7 @@ std::vector<Vec3d> throw_darts(const std::vector<SampleBlock>& blocks, Index n, 
                                std::uint64_t seed, std::span<const Vec3d> before = {});
 
 /// A maximal set of sample points at least `gap` spacings from each other and from those in
-/// `before`. @param device helps, or null
+/// `before`. @param device does a part of the work; null for the host alone
 std::vector<Vec3d> fill_with_darts(const std::vector<SampleBlock>& blocks,
                                    const SpacingField& spacing, double gap, std::uint64_t seed,
                                    std::span<const Vec3d> before,

@@ -56,10 +56,6 @@ void sweep_over(std::vector<Vec3d>& site, std::size_t fixed, const SpacingField&
   }
 }
 
-}  // namespace
-
-namespace {
-
 /// The pieces that sample points lie on, by the nearest of the points.
 class NearestPiece {
  public:

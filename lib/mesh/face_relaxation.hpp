@@ -23,7 +23,7 @@ class SurfaceOnDevice;
 /// @param spacing wanted distance between the points
 /// @param margin places that no point moves to
 /// @param stage is told the share of sweeps that is done
-/// @param device helps, or null
+/// @param device does a part of the work; null for the host alone
 void relax_on_faces(const Surface& surface, std::span<const PointOn> sample,
                     std::vector<Vec3d>& site, std::size_t fixed, const SpacingField& spacing,
                     const CutMargin& margin, int sweeps, Stage& stage,

@@ -16,13 +16,18 @@ namespace phyxel {
 /// Number of phyxels below which a host has filled a body before a device would have.
 inline constexpr Index least_filled_by_device = 20'000;
 
+/// Mean work of a winding number, `InsideSampler::winding_work`, above which the host tells sooner
+/// than a device what is inside: it walks past few triangles where a device would visit most. A
+/// scan takes a thousand, a disc of long thin triangles 10⁵.
+inline constexpr Offset most_winding_work = 4000;
+
 /// Nodes of a lattice inside a surface.
 struct LatticeNodes {
   Bulk<Vec3d> position;   ///< [m]
   Bulk<float> clearance;  ///< In spacings, shape [n_nodes].
 };
 
-/// What nodes keep off.
+/// The points from which nodes keep a distance.
 struct SurfaceMarks {
   std::span<const Vec3d> sites;    ///< Phyxels on the surface and on cuts [m].
   std::span<const Vec3d> samples;  ///< Sample points on the surface and on cuts [m].
@@ -50,9 +55,9 @@ struct PointsOnFaces {
   int sweeps = 0;
 };
 
-/// A closed surface on a device. What it finds has the bits of what the host finds. It finds
-/// nothing where the device lacks memory, and in the rare case that rounding on the device might
-/// decide whether a place is inside: the host does that work then.
+/// A closed surface on a device. Results have the bits of the host's. There are none if the device
+/// lacks memory, or if a winding number is too far from whole numbers to tell inside from outside:
+/// then the host does the work.
 class SurfaceOnDevice {
  public:
   virtual ~SurfaceOnDevice() = default;

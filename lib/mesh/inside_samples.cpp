@@ -84,13 +84,14 @@ InsideSampler::InsideSampler(const Surface& surface, bool closed)
   }
   middle_ = 0.5 * (low + high);
   extent_ = std::max({high.x - low.x, high.y - low.y, high.z - low.z});
-  few_ = few_for_walking();
+  winding_work_ = mean_winding_work();
+  // Long thin triangles have large overlapping groups, so that a winding number near them visits
+  // most triangles; walking past hundreds then costs less.
+  few_ = std::max(few_triangles, static_cast<std::size_t>(winding_work_ / 8));
 }
 
-/// Number of triangles up to which walking is faster, from measured winding numbers. Long thin
-/// triangles have large overlapping groups, so that a winding number near them visits most
-/// triangles; walking past hundreds then costs less.
-std::size_t InsideSampler::few_for_walking() const {
+/// The mean work of winding numbers at places on the surface.
+Offset InsideSampler::mean_winding_work() const {
   constexpr std::size_t probes = 32;
   const std::size_t step = surface_.triangle.size() / probes + 1;
   Offset work = 0, probed = 0;
@@ -101,7 +102,7 @@ std::size_t InsideSampler::few_for_walking() const {
                         3.0,
                     &work);
   }
-  return std::max(few_triangles, static_cast<std::size_t>(work / std::max<Offset>(probed, 1) / 8));
+  return work / std::max<Offset>(probed, 1);
 }
 
 bool InsideSampler::stays_inside(Vec3d before, Vec3d after, double most, ClearBall& ball) const {

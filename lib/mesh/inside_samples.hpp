@@ -90,12 +90,16 @@ class InsideSampler {
     SampleGrid grid;
     std::vector<SampleRegion> list;
   };
+  /// @param sweep without `coarse` and without a limit of the work
   Regions regions(const SampleSweep& sweep) const;
 
   bool inside(Vec3d point) const { return winding_number_(point) > 0.5; }
   /// Tells whether a step stays inside; see the function of that name.
   bool stays_inside(Vec3d before, Vec3d after, double most, ClearBall& ball) const;
   const WindingNumber& winding_number() const { return winding_number_; }
+  /// The mean work of a winding number near the surface, in the units of `SampleTally::work`: large
+  /// beside long thin triangles, whose groups overlap.
+  Offset winding_work() const { return winding_work_; }
   /// Approximate number of voxels that the surface passes through; the sampler visits each.
   double surface_voxels(double voxel) const { return (area_ / voxel + length_) / voxel; }
   double area() const { return area_; }      ///< Area of the surface [m^2].
@@ -141,7 +145,7 @@ class InsideSampler {
   std::vector<Cell> tasks_of(const Grid& grid, Cell root, SampleTally& total) const;
   void add_regions(const Grid& grid, Cell& cell, std::vector<SampleRegion>& regions) const;
   std::vector<Cell> split(const Grid& grid, Cell& cell, SampleTally& tally) const;
-  std::size_t few_for_walking() const;
+  Offset mean_winding_work() const;
   /// @param a, b, c corners of the triangle, relative to the cube's middle and along its edges [m]
   bool may_touch(Vec3d a, Vec3d b, Vec3d c, double half) const;
   void deal_out(const Grid& grid, const Cell& cell, double half, std::vector<Cell>& children) const;
@@ -163,6 +167,7 @@ class InsideSampler {
   bool closed_;
   WindingNumber winding_number_;
   Vec3d middle_;
+  Offset winding_work_ = 0;
   std::size_t few_ = 0;  ///< Number of triangles up to which walking from a known point is faster.
   double extent_ = 0;
   double area_ = 0;    ///< Sum of the triangles' areas [m^2].

@@ -100,7 +100,7 @@ LatticeNodes nodes_inside(const LatticeRequest& request, double spacing) {
   const std::vector<Vec3d> sites = all_sites(request.sites),
                            samples = marks_on_surface(request, spacing);
   const SurfaceMarks marks{sites, samples, spacing, request.sites.spacing.coarsest()};
-  if (request.device) {
+  if (request.device && request.sampler.winding_work() <= most_winding_work) {
     const auto regions = request.sampler.regions(lattice_sweep(request, spacing));
     if (std::optional<LatticeNodes> nodes = request.device->nodes(regions, marks)) {
       return std::move(*nodes);
@@ -292,7 +292,8 @@ class Skin {
                               .seed = request_.seed + 2,
                               .wanted = wanted};
       std::vector<double> shares;
-      if (device_ && !counts) shares = volumes_by_device(sweep, site);
+      const bool is_cheap = request_.sampler.winding_work() <= most_winding_work;
+      if (device_ && is_cheap && !counts) shares = volumes_by_device(sweep, site);
       if (shares.empty()) {
         shares = NearestSite(site, spacing_).volumes(request_.sampler, sweep, stage, counts);
       }

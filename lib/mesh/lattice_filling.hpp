@@ -26,7 +26,8 @@ struct LatticeRequest {
   Index phyxels = 0;             ///< Number of phyxels inside, 1 or more.
   std::uint64_t seed = 1;        ///< Seed of the lattice's position and of sample points.
   int sweeps = 10;               ///< Sweeps that move the nodes near the surface.
-  const SurfaceOnDevice* device = nullptr;  ///< Helps, or null.
+  /// Does a part of the work; null for the host alone.
+  const SurfaceOnDevice* device = nullptr;
 };
 
 /// Phyxels inside a surface, and the volumes of all its phyxels.

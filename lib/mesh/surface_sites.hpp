@@ -14,11 +14,10 @@ namespace phyxel {
 
 class InsideSampler;
 class Stage;
+class SurfaceOnDevice;
 
 /// Sites on a surface and on cuts through its inside, with about the spacing of the phyxels that
 /// will fill the rest.
-class SurfaceOnDevice;
-
 struct SurfaceSites {
   std::vector<Vec3d> position;  ///< Sites on the surface [m].
   std::vector<Vec3d> on_cuts;   ///< Sites on cuts, inside the surface [m].
@@ -40,7 +39,8 @@ struct SurfaceSites {
 /// @param volume enclosed volume [m³]
 /// @param spacing the wanted one; the one found may be coarser
 /// @param phyxels total number of phyxels, some of which are left for the inside
-/// @param stage is told the progress. @param device helps, or null
+/// @param stage is told the progress. @param device does a part of the work; null for the host
+/// alone
 /// @throws InputError if there are so few phyxels that those on opposite sides would be nearer to
 ///   each other than those side by side
 SurfaceSites sites_on(const Surface& surface, const SurfaceTopology& topology, double volume,

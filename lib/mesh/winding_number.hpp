@@ -26,9 +26,7 @@ class WindingNumber {
   explicit WindingNumber(const Surface& surface, double accuracy = 2.5);
 
   /// @param work if given, is raised by one for each group and by `WindingView::angle_work` for
-  /// each
-  ///   triangle
-  ///   visited
+  ///   each triangle visited
   double operator()(Vec3d point, Offset* work = nullptr) const;
   /// The distance from a point to the nearest triangle [m], or `most` where it is larger.
   /// @param nearest if given, is a triangle likely to be near, or -1, and receives the nearest one;

@@ -53,7 +53,7 @@ DeviceSetup setup_by(const ChosenDevice& device, bool surveys) {
   return setup;
 }
 
-/// What helps to fill surfaces; null for the CPU.
+/// The device that fills surfaces with the host; null for the CPU.
 std::shared_ptr<const FillingDevice> filling_device(const ChosenDevice& device) {
   return device.gpu ? cuda_filling_device(device.gpu->index) : nullptr;
 }

@@ -48,12 +48,13 @@ ChosenDevice choose_device(const std::string& name, const std::string& where = "
 ChosenDevice choose_device(const Ranks& ranks, const std::string& name,
                            const std::string& where = "device");
 
-/// Fills a surface as `sample_surface` without a device does, to the last bit, with the help of a
-/// device. @throws InputError likewise, and DeviceError
+/// Fills a surface with the help of a device. The cloud is that of `sample_surface` without one, to
+/// the last bit. @throws InputError as `sample_surface` does, and DeviceError
 Cloud sample_surface(const Surface& surface, const SampleRequest& request,
                      const ChosenDevice& device, SampleReport* report = nullptr);
 
-/// Makes the clouds of a scene as `make_clouds` without a device does, likewise.
+/// Makes the clouds of a scene with the help of a device. They are those of `make_clouds` without
+/// one, to the last bit. @throws Error as `make_clouds` does, and DeviceError
 std::vector<Cloud> make_clouds(const Scene& scene, const std::map<std::string, Cloud>& named,
                                const ChosenDevice& device);
 

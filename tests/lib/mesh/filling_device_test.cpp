@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstring>
+#include <numbers>
 #include <numeric>
 
 #include "mesh/filling_rules.hpp"
@@ -291,6 +293,32 @@ TEST_F(FillingByDevice, IsDoneByTheHostIfTheDeviceDeclines) {
   EXPECT_EQ(calls_.repel, 1);
   EXPECT_EQ(calls_.gaps, 1);
   EXPECT_EQ(calls_.samples, 1);
+}
+
+/// A disc whose flat faces are fans of thin triangles around a point.
+Surface fan_disc(int sectors) {
+  Surface disc;
+  disc.position = {{0, 0, 0}, {0, 0, 0.3}};
+  for (int k = 0; k < sectors; ++k) {
+    const double angle = 2 * std::numbers::pi * k / sectors;
+    const Index low = 2 + 2 * k, high = low + 1, next = 2 + 2 * ((k + 1) % sectors);
+    disc.position.push_back({std::cos(angle), std::sin(angle), 0});
+    disc.position.push_back({std::cos(angle), std::sin(angle), 0.3});
+    disc.triangle.insert(
+        disc.triangle.end(),
+        {{0, next, low}, {1, high, next + 1}, {low, next, next + 1}, {low, next + 1, high}});
+  }
+  test::add_normals(disc);
+  return disc;
+}
+
+/// A winding number beside such triangles visits most of them: the host walks past few.
+TEST_F(FillingByDevice, LeavesWindingNumbersOfThinTrianglesToTheHost) {
+  expect_same(fan_disc(1000), {.phyxels = 2000});
+  EXPECT_EQ(calls_.nodes, 0);
+  EXPECT_EQ(calls_.samples, 0);
+  EXPECT_EQ(calls_.darts, 1);
+  EXPECT_EQ(calls_.repel, 1);
 }
 
 TEST_F(FillingByDevice, EndsWithTheScope) {
