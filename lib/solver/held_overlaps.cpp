@@ -167,7 +167,8 @@ class HeldMeetings {
         for (std::size_t b = 0; b < boxes_.size(); ++b) boxes_[b] = together(boxes_[b], some[b]);
       }
     }
-    partners_ = partners_of_bodies(model.body_contact, boxes_);
+    NearBoxes near;
+    partners_ = partners_of_bodies(model.body_contact, boxes_, near);
     own_ = candidates(places);
     all_ = own_;
     if (model.share) {
@@ -208,8 +209,7 @@ class HeldMeetings {
 
  private:
   bool may_meet(const HeldPhyxel& x, Index body) const {
-    return contains(boxes_[body], x.now) &&
-           std::binary_search(partners_[x.body].begin(), partners_[x.body].end(), body);
+    return contains(boxes_[body], x.now) && std::ranges::binary_search(partners_.row(x.body), body);
   }
   /// The held phyxels of this rank that are in the box of a body that theirs may touch.
   std::vector<HeldPhyxel> candidates(const HeldPlaces& places) const {
@@ -223,7 +223,7 @@ class HeldMeetings {
                             .support = model_.neighbourhood.support[i],
                             .offset = offset[i],
                             .body = body};
-      const std::vector<Index>& others = partners_[body];
+      const std::span<const Index> others = partners_.row(body);
       if (std::none_of(others.begin(), others.end(),
                        [&](Index b) { return b != body && may_meet(held, b); })) {
         return;
@@ -280,7 +280,7 @@ class HeldMeetings {
   const Model& model_;
   const std::vector<char>& is_whole_;
   std::vector<Box> boxes_;  // of the held phyxels of each body [m]
-  std::vector<std::vector<Index>> partners_;
+  Csr partners_;
   std::vector<HeldPhyxel> own_, all_;  // of this rank, and of all ranks
 };
 
