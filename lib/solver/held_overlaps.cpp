@@ -186,7 +186,9 @@ class HeldMeetings {
     std::vector<HeldOverlap> found(is_whole_.size());
     std::map<Index, std::vector<std::size_t>> of_body;
     for (std::size_t k = 0; k < all_.size(); ++k) of_body[all_[k].body].push_back(k);
-    for (const auto& [body, numbers] : of_body) {
+    for (const auto& entry_of_body : of_body) {
+      const Index body = entry_of_body.first;
+      const std::vector<std::size_t>& numbers = entry_of_body.second;
       std::vector<Vec3d> places;
       double support = 0;
       for (const std::size_t k : numbers) {
