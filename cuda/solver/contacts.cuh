@@ -251,7 +251,8 @@ class Contacts {
     for (std::size_t o = 0; o < sums_.size(); ++o) {
       const Obstacle& obstacle = m_.model().obstacles[o];
       if (!(obstacle.penalty > 0)) continue;
-      const ObstacleStep start = obstacle.free ? rigid_.start_of(o) : obstacle.stage_to(time, dt_);
+      const ObstacleStep start =
+          obstacle.free ? rigid_.start_of(o, dt_) : obstacle.stage_to(time, dt_);
       const SumWords words = sums_[o].pointer();
       ObstacleShapes::with(fields_[o].form(), [&](const auto& shape) {
         m_.launch_each("push_out", push_out<std::decay_t<decltype(shape)>, Real, StateReal>,

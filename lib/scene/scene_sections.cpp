@@ -16,7 +16,8 @@ std::vector<SceneSection> boundary_sections() {
        "some: `axes = \"z\"` of all phyxels is plane strain. Each entry of `fixed` and `motion` is a set "
        "of its own in `reactions.csv`, which has one line for each frame and set, named by its body and "
        "entry, e.g. `fixed 1`, `motion 2`: force [N] and torque [N m] of the support on the body, and the "
-       "work [J] that it has done since t = 0. The torque is taken about the set's centre of mass at "
+       "work [J] that it has done since t = 0; in Verlet's steps without the work against what its own "
+       "phyxels touch, which `contacts.csv` has. The torque is taken about the set's centre of mass at "
        "rest, the last three columns. A phyxel that two entries hold along different axes has a part in "
        "both sets, along their axes."},
       {"body.symmetry", "[[body.symmetry]]", "",

@@ -45,9 +45,11 @@ class RigidBodies {
   void begin_step(double time, double dt);
   /// Where an obstacle that is a free body is at the end of the step, and how it moves.
   const ObstacleStep& step_of(std::size_t obstacle) const { return steps_[number_[obstacle]]; }
-  /// Where an obstacle that is a free body is before the step, and how it moves.
-  ObstacleStep start_of(std::size_t obstacle) const {
-    return model_.obstacles[obstacle].placed(states_[number_[obstacle]]);
+  /// Where an obstacle that is a free body is before a step of `dt` [s], and how it moves.
+  ObstacleStep start_of(std::size_t obstacle, double dt) const {
+    ObstacleStep step = model_.obstacles[obstacle].placed(states_[number_[obstacle]]);
+    step.dt = dt;  // for which forces act on it
+    return step;
   }
   /// Lets what obstacles have done to phyxels since the last call act back. Of a share: collective.
   /// @param sums of all obstacles and steps so far, of this rank (`ContactTerms`)

@@ -102,7 +102,7 @@ class StepContacts {
       const Obstacle& obstacle = model_.obstacles[o];
       if (!obstacle.free) steps_[o] = obstacle.step_from(time, dt);
       if (!pushes_) continue;
-      starts_[o] = obstacle.free ? rigid_.start_of(o) : obstacle.stage_to(time, dt);
+      starts_[o] = obstacle.free ? rigid_.start_of(o, dt) : obstacle.stage_to(time, dt);
     }
     time_ = time;
 #pragma omp parallel for schedule(static) num_threads(threads_here())

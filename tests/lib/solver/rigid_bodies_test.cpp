@@ -193,6 +193,35 @@ TEST(RigidBodies, KeepBothMomentaInAnImpactOnABody) {
   EXPECT_NEAR(now.total_energy(), start.total_energy(), 0.01 * start.total_energy());
 }
 
+/// A penalty's force acts on a free body as it acts on the phyxels.
+TEST(RigidBodies, KeepBothMomentaInAnImpactByPenalties) {
+  Rigid way(impact("method = 'penalty'\n"), 1e-4);
+  const Diagnostics start = way.look();
+  way.solver.step(6000);
+  ASSERT_EQ(way.contacts().at(0).force, Vec3d{});  // they are apart
+  const Diagnostics now = way.look();
+  EXPECT_LT(way.read().velocity.z, -0.2);
+  EXPECT_GT(norm(way.momentum()), 0.5);  // it has been hit
+  const double size = norm(start.momentum);
+  EXPECT_LE(norm(now.momentum - start.momentum), 1e-12 * size);  // rounding
+  EXPECT_LE(norm(now.angular_momentum - start.angular_momentum), 1e-12 * size * 0.2);
+  EXPECT_NEAR(now.total_energy(), start.total_energy(), 0.01 * start.total_energy());
+}
+
+TEST(RigidBodies, RestOnABodyWithTheirWeightByPenalties) {
+  Rigid way(fmt::format("gravity = [0, 0, -{}]\n", g) + end +
+                floor_with("translation = [0, 0, -0.1]\nfriction = 0.5\n") +
+                obstacle("shape = 'box'\nsize = [0.1, 0.1, 0.1]\ndensity = 100\nfriction = 0.5\n"
+                         "method = 'penalty'\ntranslation = [0, 0, 0.15]\n") +
+                block(),
+            dt);
+  way.solver.step(20000);
+  const double weight = 100 * 1e-3 * g;
+  // It still swings on its springs, which only the block damps.
+  EXPECT_NEAR(way.contacts()[1].force.z, -weight, 0.02 * weight);
+  EXPECT_LE(norm(way.read().velocity), 5e-3);
+}
+
 TEST(RigidBodies, RestOnABodyWithTheirWeight) {
   Rigid way(fmt::format("gravity = [0, 0, -{}]\n", g) + end +
                 floor_with("translation = [0, 0, -0.1]\nfriction = 0.5\n") +
