@@ -178,10 +178,8 @@ std::string impact(const std::string& more = "") {
          "lattice = 'nodes'\n[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n";
 }
 
-TEST(RigidBodies, KeepBothMomentaInAnImpactOnABody) {
-  Rigid way(impact(), 1e-4);
-  const Diagnostics start = way.look();
-  way.solver.step(1500);
+/// Expects that an impact of `impact` has kept both momenta, and the energy.
+void expect_impact(Rigid& way, const Diagnostics& start) {
   const Diagnostics now = way.look();
   EXPECT_LT(way.read().velocity.z, -0.2);
   EXPECT_GT(way.momentum().z, -100);
@@ -193,19 +191,20 @@ TEST(RigidBodies, KeepBothMomentaInAnImpactOnABody) {
   EXPECT_NEAR(now.total_energy(), start.total_energy(), 0.01 * start.total_energy());
 }
 
+TEST(RigidBodies, KeepBothMomentaInAnImpactOnABody) {
+  Rigid way(impact(), 1e-4);
+  const Diagnostics start = way.look();
+  way.solver.step(1500);
+  expect_impact(way, start);
+}
+
 /// A penalty's force acts on a free body as it acts on the phyxels.
 TEST(RigidBodies, KeepBothMomentaInAnImpactByPenalties) {
   Rigid way(impact("method = 'penalty'\n"), 1e-4);
   const Diagnostics start = way.look();
   way.solver.step(6000);
   ASSERT_EQ(way.contacts().at(0).force, Vec3d{});  // they are apart
-  const Diagnostics now = way.look();
-  EXPECT_LT(way.read().velocity.z, -0.2);
-  EXPECT_GT(norm(way.momentum()), 0.5);  // it has been hit
-  const double size = norm(start.momentum);
-  EXPECT_LE(norm(now.momentum - start.momentum), 1e-12 * size);  // rounding
-  EXPECT_LE(norm(now.angular_momentum - start.angular_momentum), 1e-12 * size * 0.2);
-  EXPECT_NEAR(now.total_energy(), start.total_energy(), 0.01 * start.total_energy());
+  expect_impact(way, start);
 }
 
 TEST(RigidBodies, RestOnABodyWithTheirWeightByPenalties) {
