@@ -331,7 +331,8 @@ TEST(Regions, HoldTheBlocksOfASweep) {
   const Surface surface = test::sphere({0.1, 0.2, 0.3}, 1, 3);
   const InsideSampler sampler(surface, true);
   for (const bool at_random : {true, false}) {
-    const SampleSweep sweep{.voxel = 0.04, .seed = 3, .at_random = at_random};
+    const SampleSweep sweep{
+        .voxel = 0.01, .seed = 3, .at_random = at_random};  // tasks have regions
     std::vector<SampleBlock> blocks;
     sampler.collect(sweep, blocks);
     const InsideSampler::Regions regions = sampler.regions(sweep);
