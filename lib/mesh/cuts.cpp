@@ -301,12 +301,18 @@ bool CutMargin::contains(Vec3d place) const {
 bool CutMargin::is_thin(Vec3d place, const SpaceRegion& region, double spacing) const {
   static const std::vector<Vec3d> ball_points = points_of_ball();
   const bool here = region.contains(place);
-  int same = 0, other = 0;
-  for (const Vec3d& offset : ball_points) {
-    const Vec3d p = place + thin_radius * spacing * offset;
-    if (sampler_.inside(p)) ++(region.contains(p) == here ? same : other);
+  // Winding numbers take most of the time: those of the points on this side are found only until
+  // they are as many as those on the other side.
+  int more = 0;  // on the other side
+  for (const bool on_this_side : {false, true}) {
+    for (const Vec3d& offset : ball_points) {
+      const Vec3d p = place + thin_radius * spacing * offset;
+      if ((region.contains(p) == here) != on_this_side) continue;
+      if (on_this_side && more <= 0) return false;
+      if (sampler_.inside(p)) more += on_this_side ? -1 : 1;
+    }
   }
-  return same < other;
+  return more > 0;
 }
 
 }  // namespace phyxel
