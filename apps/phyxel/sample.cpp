@@ -145,13 +145,11 @@ void say_summary(const SampleOptions& options, const Cloud& cloud, const SampleR
              static_cast<double>(cloud.position.size()) / seconds);
 }
 
-/// The device that fills the body with the host; none, unless one is asked for, for bodies that the
-/// host fills alone.
-ChosenDevice device_for(const SampleOptions& options) {
+/// The device that the user has asked for. "auto" stands for none where the host fills a body
+/// sooner alone.
+ChosenDevice device_for(const SampleOptions& options, const SampleRequest& request) {
   check_device_name(options.device, "--device");
-  const bool alone =
-      options.phyxels < least_filled_by_device || options.ratio || options.on_surface == false;
-  if (options.device == "auto" && alone) return {};
+  if (options.device == "auto" && !is_worth_device(request)) return {};
   return choose_device(options.device);
 }
 
@@ -160,7 +158,7 @@ void sample(const SampleOptions& options) {
   const SampleRequest request = request_of(options);
   expect_kind(options.mesh, {Kind::mesh});
   check_output(options);
-  const ChosenDevice device = device_for(options);
+  const ChosenDevice device = device_for(options, request);
   SampleReport report;
   Cloud cloud;
   {

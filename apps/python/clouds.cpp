@@ -192,7 +192,7 @@ Cloud sample(const py::object& mesh, Index phyxels, std::uint64_t seed, int rela
   if (grading) request.grading = grading_from(*grading);
   const py::gil_scoped_release others;
   SampleReport report;
-  const bool alone = device == "auto" && phyxels < least_filled_by_device;
+  const bool alone = device == "auto" && !is_worth_device(request);
   Cloud cloud =
       sample_surface(surface, request, alone ? ChosenDevice{} : choose_device(device), &report);
   cloud.warnings = std::move(report.warnings);

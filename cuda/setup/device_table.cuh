@@ -2,7 +2,6 @@
 #pragma once
 
 #include <span>
-#include <vector>
 
 #include "model/cell_search.hpp"
 #include "setup/device_hash.cuh"
@@ -46,22 +45,15 @@ class DeviceTable {
  public:
   /// @param point positions on the device, one at least [m]. @param cell_size as `SpatialHash` [m]
   DeviceTable(const DeviceArray<Vec3d>& point, double cell_size)
-      : cell_size_(fitting_size(point, cell_size)), hash_(point, bodies_of(point, cell_size)) {}
+      : DeviceTable(point, box_around(point, 0, static_cast<Index>(point.size())), cell_size) {}
 
   TableView view() const { return TableView(hash_.view()); }
   double cell_size() const { return cell_size_; }
   double mean_occupancy() const { return hash_.mean_occupancy(); }
 
  private:
-  static Index size_of(const DeviceArray<Vec3d>& point) { return static_cast<Index>(point.size()); }
-  static double fitting_size(const DeviceArray<Vec3d>& point, double cell_size) {
-    const Box box = box_around(point, 0, size_of(point));
-    return cell_size_for(box.low, box.high, cell_size);
-  }
-  static std::vector<DeviceHash::Body> bodies_of(const DeviceArray<Vec3d>& point,
-                                                 double cell_size) {
-    return {{0, size_of(point), cell_size}};
-  }
+  DeviceTable(const DeviceArray<Vec3d>& point, const Box& box, double cell_size)
+      : cell_size_(cell_size_for(box.low, box.high, cell_size)), hash_(point, box, cell_size) {}
 
   double cell_size_;
   DeviceHash hash_;

@@ -427,8 +427,8 @@ class SurfaceOnGpu : public SurfaceOnDevice {
     return moved.has_value();
   }
 
-  /// What find(inside) returns; nothing if the device lacks memory, or if rounding might decide
-  /// what is inside.
+  /// The result of find(inside); none if the device lacks memory, or if a winding number is far
+  /// from whole ones.
   template <class Find>
   auto unless_declined(Find&& find) const -> std::optional<std::invoke_result_t<Find, InsideTest>> {
     try {

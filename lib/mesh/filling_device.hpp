@@ -10,11 +10,22 @@
 #include "bulk.hpp"
 #include "mesh/inside_samples.hpp"
 #include "mesh/triangle.hpp"
+#include "phyxel/mesh.hpp"
 
 namespace phyxel {
 
 /// Number of phyxels below which a host has filled a body before a device would have.
 inline constexpr Index least_filled_by_device = 20'000;
+
+/// True if a device can do a part of the work of a request: that of a body with phyxels on its
+/// surface and the same distance between phyxels everywhere.
+inline bool suits_device(const SampleRequest& request) {
+  return !request.grading && request.on_surface.value_or(true);
+}
+/// True if it is then done sooner, too.
+inline bool is_worth_device(const SampleRequest& request) {
+  return suits_device(request) && request.phyxels >= least_filled_by_device;
+}
 
 /// Mean work of a winding number, `InsideSampler::winding_work`, above which the host tells sooner
 /// than a device what is inside: it walks past few triangles where a device would visit most. A
@@ -27,7 +38,7 @@ struct LatticeNodes {
   Bulk<float> clearance;  ///< In spacings, shape [n_nodes].
 };
 
-/// The points from which nodes keep a distance.
+/// The points on the surface from which nodes keep a distance.
 struct SurfaceMarks {
   std::span<const Vec3d> sites;    ///< Phyxels on the surface and on cuts [m].
   std::span<const Vec3d> samples;  ///< Sample points on the surface and on cuts [m].

@@ -27,26 +27,12 @@ constexpr double most_clearance = 0.8;
 /// are the same with 4; in small bodies, 6 take no time.
 double samples_along(Index phyxels) { return phyxels > 100'000 ? 4 : 6; }
 
-/// A test that tells places deep inside a surface and far from cuts.
-class Depth {
- public:
-  Depth(const LatticeRequest& request, double spacing)
-      : spacing_(spacing),
-        farthest_(request.sites.spacing.coarsest()),
-        site_(all_sites(request.sites), depth_cell * spacing) {}
+/// The device that tells which places are inside; null where the host does so sooner.
+const SurfaceOnDevice* inside_device(const LatticeRequest& request) {
+  return request.sampler.winding_work() <= most_winding_work ? request.device : nullptr;
+}
 
-  /// True if every place within `radius` [m] of `middle` has a clearance of at least `least`
-  /// spacings.
-  bool is_deep(Vec3d middle, double radius, double least) const {
-    return phyxel::is_deep(site_, middle, radius, least * spacing_, farthest_);
-  }
-
- private:
-  double spacing_, farthest_;
-  SpatialHash site_;
-};
-
-/// Sample points on the surface and on cuts, which nodes keep off [m].
+/// Sample points on the surface and on cuts, from which nodes keep a distance [m].
 std::vector<Vec3d> marks_on_surface(const LatticeRequest& request, double spacing) {
   std::vector<Vec3d> points;
   for (const PointOn& p :
@@ -66,14 +52,14 @@ SampleSweep lattice_sweep(const LatticeRequest& request, double spacing) {
 /// All nodes of the lattice inside, task by task.
 LatticeNodes nodes_on_host(const LatticeRequest& request, const SurfaceMarks& marks) {
   const double spacing = marks.spacing;
-  const Depth depth(request, spacing);
-  const SpatialHash site(marks.sites, site_cell * spacing),
-      sample(marks.samples, sample_cell * spacing);
+  const SpatialHash deep_site(marks.sites, depth_cell * spacing),
+      site(marks.sites, site_cell * spacing), sample(marks.samples, sample_cell * spacing);
   std::vector<LatticeNodes> by_task(InsideSampler::most_tasks);
   request.sampler.visit(
       lattice_sweep(request, spacing), [&](std::size_t task, const SampleBlock& block) {
         LatticeNodes& nodes = by_task[task];
-        const bool deep = depth.is_deep(block.centre, radius_of_nodes(spacing), largest_clearance);
+        const bool deep = is_deep(deep_site, block.centre, radius_of_nodes(spacing),
+                                  largest_clearance * spacing, marks.farthest);
         for (std::size_t k = 0; k < block.offset.size(); ++k) {
           const Vec3d p = block.position(k);
           nodes.position.push_back(p);
@@ -100,9 +86,9 @@ LatticeNodes nodes_inside(const LatticeRequest& request, double spacing) {
   const std::vector<Vec3d> sites = all_sites(request.sites),
                            samples = marks_on_surface(request, spacing);
   const SurfaceMarks marks{sites, samples, spacing, request.sites.spacing.coarsest()};
-  if (request.device && request.sampler.winding_work() <= most_winding_work) {
+  if (const SurfaceOnDevice* const device = inside_device(request)) {
     const auto regions = request.sampler.regions(lattice_sweep(request, spacing));
-    if (std::optional<LatticeNodes> nodes = request.device->nodes(regions, marks)) {
+    if (std::optional<LatticeNodes> nodes = device->nodes(regions, marks)) {
       return std::move(*nodes);
     }
   }
@@ -271,7 +257,7 @@ class Skin {
   /// the space in its region, unless no other phyxel is there.
   std::vector<double> sampled_volumes(Stage& stage) const {
     const Rooms rooms(request_.sites.cuts, point_);
-    const Depth depth(request_, spacing_);
+    const SpatialHash all(all_sites(request_.sites), depth_cell * spacing_);
     std::vector<double> volume(point_.size());
     for (std::size_t room = 0; room < rooms.size(); ++room) {
       const std::vector<std::size_t>& here = rooms.points_in(room);
@@ -284,7 +270,8 @@ class Skin {
         // Smaller cells are parts of one that is wanted; larger ones would need a long search.
         if (half < 0.5 * spacing_ || half > 4 * spacing_) return true;
         // Cells of a Voronoi diagram reach one spacing from their phyxels.
-        return !depth.is_deep(middle, radius, regular_clearance + 1);
+        return !is_deep(all, middle, radius, (regular_clearance + 1) * spacing_,
+                        request_.sites.spacing.coarsest());
       };
       std::function<bool(Vec3d)> counts;
       if (rooms.size() > 1) counts = [&](Vec3d p) { return rooms.room_of(p) == room; };
@@ -292,8 +279,7 @@ class Skin {
                               .seed = request_.seed + 2,
                               .wanted = wanted};
       std::vector<double> shares;
-      const bool is_cheap = request_.sampler.winding_work() <= most_winding_work;
-      if (device_ && is_cheap && !counts) shares = volumes_by_device(sweep, site);
+      if (!counts) shares = volumes_by_device(sweep, site);
       if (shares.empty()) {
         shares = NearestSite(site, spacing_).volumes(request_.sampler, sweep, stage, counts);
       }
@@ -315,7 +301,9 @@ class Skin {
   /// The volumes [m^3] that sample points give to sites; none if the device has none.
   std::vector<double> volumes_by_device(const SampleSweep& sweep,
                                         std::span<const Vec3d> site) const {
-    const auto count = device_->samples_of_sites(request_.sampler.regions(sweep), site, spacing_);
+    const SurfaceOnDevice* const device = inside_device(request_);
+    if (!device) return {};
+    const auto count = device->samples_of_sites(request_.sampler.regions(sweep), site, spacing_);
     return count ? volumes_of_samples(*count, sweep.voxel) : std::vector<double>{};
   }
 

@@ -372,7 +372,7 @@ Cloud sample_surface(const Surface& surface, const SampleRequest& request, Sampl
   const InsideSampler sampler(prepared.surface, closed);
   std::unique_ptr<SurfaceOnDevice> device;
   if (const FillingDevice* const chosen = FillingScope::device();
-      chosen && closed && !request.grading && request.on_surface.value_or(true)) {
+      chosen && closed && suits_device(request)) {
     device = chosen->take(sampler.winding_number(), request.phyxels);
   }
 

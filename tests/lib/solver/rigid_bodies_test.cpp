@@ -207,13 +207,18 @@ TEST(RigidBodies, KeepBothMomentaInAnImpactByPenalties) {
   expect_impact(way, start);
 }
 
+/// A box on a block on a floor. @param density of the box [kg/m³]
+std::string box_on_block(double density, const std::string& keys = "") {
+  return fmt::format("gravity = [0, 0, -{}]\n", g) + end +
+         floor_with("translation = [0, 0, -0.1]\nfriction = 0.5\n") +
+         obstacle(fmt::format("shape = 'box'\nsize = [0.1, 0.1, 0.1]\ndensity = {}\n"
+                              "friction = 0.5\ntranslation = [0, 0, 0.15]\n{}",
+                              density, keys)) +
+         block();
+}
+
 TEST(RigidBodies, RestOnABodyWithTheirWeightByPenalties) {
-  Rigid way(fmt::format("gravity = [0, 0, -{}]\n", g) + end +
-                floor_with("translation = [0, 0, -0.1]\nfriction = 0.5\n") +
-                obstacle("shape = 'box'\nsize = [0.1, 0.1, 0.1]\ndensity = 100\nfriction = 0.5\n"
-                         "method = 'penalty'\ntranslation = [0, 0, 0.15]\n") +
-                block(),
-            dt);
+  Rigid way(box_on_block(100, "method = 'penalty'\n"), dt);
   way.solver.step(20000);
   const double weight = 100 * 1e-3 * g;
   // It still swings on its springs, which only the block damps.
@@ -222,12 +227,7 @@ TEST(RigidBodies, RestOnABodyWithTheirWeightByPenalties) {
 }
 
 TEST(RigidBodies, RestOnABodyWithTheirWeight) {
-  Rigid way(fmt::format("gravity = [0, 0, -{}]\n", g) + end +
-                floor_with("translation = [0, 0, -0.1]\nfriction = 0.5\n") +
-                obstacle("shape = 'box'\nsize = [0.1, 0.1, 0.1]\ndensity = 2000\nfriction = 0.5\n"
-                         "translation = [0, 0, 0.15]\n") +
-                block(),
-            dt);
+  Rigid way(box_on_block(2000), dt);
   way.solver.step(20000);
   const double weight = 2000 * 1e-3 * g;
   const std::vector<ContactReading> contacts = way.contacts();
