@@ -65,6 +65,7 @@ class Maker {
     }
     m.obstacles = whole_.obstacles;
     m.contact = owned_part(whole_.contact);
+    m.held_points = whole_.held_points;
     m.body_contact = whole_.body_contact;
     m.body_contact.layer = owned_part(whole_.body_contact.layer);
     m.walls = whole_.walls;

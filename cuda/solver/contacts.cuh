@@ -131,8 +131,8 @@ __global__ void push_out(Fields<Real, StateReal> f, LayerArrays<StateReal> layer
     const PushedPoint point{layer.position[k] + displacement_at(f, at), free_axes_of(layer, k),
                             layer.offset[k], penalty * penalties.stiffness[k],
                             penalties.inertia[k]};
-    const Vec3<double> change = penalty_change(shape, obstacle, point, terms);
-    if (!(change == Vec3<double>{})) {
+    Vec3<double> change{};
+    if (penalty_change(shape, obstacle, point, change, terms)) {
       set_column3(f.velocity, f.places, at,
                   to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change));
     }
@@ -260,7 +260,7 @@ class Contacts {
                        words);
       });
     }
-    if (!rigid_.empty()) rigid_.act_back(sums());
+    if (!rigid_.empty()) rigid_.act_back(sums_of_phyxels());
   }
   /// Moves phyxels out of the obstacles, one obstacle after the other, after a step from `time`
   /// [s], and lets those rub that penalties push.
@@ -283,7 +283,7 @@ class Contacts {
                        layer, shape, step, words, o + 1 == sums_.size());
       });
     }
-    if (!rigid_.empty()) rigid_.act_back(sums());
+    if (!rigid_.empty()) rigid_.act_back(sums_of_phyxels());
   }
   /// Sets the states of free bodies, as of `RigidBodies::put`.
   void put_rigid(std::span<const RigidState> states, double dt) { rigid_.put(states, dt); }
@@ -293,7 +293,7 @@ class Contacts {
     RigidBodies::Kept rigid;
     std::vector<ExactSum> sums;
   };
-  Kept kept() const { return {rigid_.kept(), sums()}; }
+  Kept kept() const { return {rigid_.kept(), sums_of_phyxels()}; }
   /// Takes steps since then back.
   void put_back(Kept kept) {
     rigid_.put_back(std::move(kept.rigid));
@@ -303,15 +303,7 @@ class Contacts {
     }
   }
   /// The sums of each obstacle so far (`ContactTerms`). Waits for the steps in progress.
-  std::vector<ExactSum> sums() const {
-    std::vector<ExactSum> all;
-    if (acts()) m_.wait();
-    for (const DeviceSums& of_obstacle : sums_) {
-      const std::vector<ExactSum> some = of_obstacle.sums();
-      all.insert(all.end(), some.begin(), some.end());
-    }
-    return all;
-  }
+  std::vector<ExactSum> sums() const { return rigid_.with_held_points(sums_of_phyxels()); }
   std::size_t bytes() const {
     std::size_t bytes = place_.bytes() + position_.bytes() + prescribed_.bytes() + offset_.bytes() +
                         before_.bytes() + inertia_.bytes() + stiffness_.bytes() +
@@ -324,6 +316,16 @@ class Contacts {
  private:
   static constexpr unsigned accumulators = 128;
 
+  /// The sums of what obstacles do to the phyxels of the layer. Waits for the steps in progress.
+  std::vector<ExactSum> sums_of_phyxels() const {
+    std::vector<ExactSum> all;
+    if (acts()) m_.wait();
+    for (const DeviceSums& of_obstacle : sums_) {
+      const std::vector<ExactSum> some = of_obstacle.sums();
+      all.insert(all.end(), some.begin(), some.end());
+    }
+    return all;
+  }
   PenaltyArrays penalties() const { return {stiffness_.data(), start_inertia_.data()}; }
 
   LayerArrays<StateReal> arrays() const {

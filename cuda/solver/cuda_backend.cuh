@@ -114,6 +114,7 @@ class CudaBackend final : public Backend {
     contacts_.prepare(dt, 1);
     passes_->receive_displacements();
     const KeptMotion<Real, StateReal> motion(m_);
+    const StepSums before = joined(contacts_.sums(), body_contacts_.sums());
     auto of_obstacles = contacts_.kept();
     StepSums of_bodies = body_contacts_.sums();
     add_loads(time);
@@ -125,7 +126,7 @@ class CudaBackend final : public Backend {
     next.depths = body_contacts_.depths();
     advance_among_contacts(time, false);
     StepSums sums = joined(contacts_.sums(), body_contacts_.sums());
-    add_words(sums, words_of(joined(of_obstacles.sums, of_bodies)), -1);
+    add_words(sums, words_of(before), -1);
     next.sums = words_of(std::move(sums));
     next.of_bodies = body_contacts_.forces();
     motion.put_back();

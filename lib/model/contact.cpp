@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <utility>
 
 #include "mesh/distance_field.hpp"
@@ -16,6 +17,7 @@
 #include "model/spatial_hash.hpp"
 #include "model/symmetry.hpp"
 #include "phyxel/error.hpp"
+#include "rank_exchange.hpp"
 #include "scene/scene_error.hpp"
 #include "tabulated.hpp"
 
@@ -191,8 +193,48 @@ double contact_offset(double distance, double spacing, bool has_layer) {
   return has_layer || distance == HUGE_VAL ? -1 : distance;
 }
 
+namespace {
+
+/// Adds the points of surfaces that are held or moved along all axes, for free rigid bodies. Of a
+/// share: collective.
+void add_held_points(Model& model, std::span<const double> offset) {
+  if (free_bodies(model).empty()) return;
+  const std::vector<char> supported = supported_phyxels(model);
+  std::map<Index, HeldPoint> found;  // by index
+  for (std::size_t m = 0; m < model.motions.size(); ++m) {
+    const Axes axes = model.motions[m].axes;
+    for (const Index i : model.motions[m].phyxels) {
+      if (offset[i] < 0 || !supported[i] || !model.owns(i)) continue;
+      HeldPoint& point = found[i];
+      point.id = model.global_id(i);
+      point.rest = model.position[i];
+      point.offset = offset[i];
+      point.support = model.neighbourhood.support[i];
+      for (const int axis : {0, 1, 2}) {
+        if (axes.bits() >> axis & 1) point.motion[axis] = static_cast<Index>(m);
+      }
+    }
+  }
+  std::vector<HeldPoint> own;
+  for (const auto& entry : found) own.push_back(entry.second);
+  model.held_points = own;
+  if (model.share) {
+    const Communicator& ranks = *model.share->communicator;
+    model.held_points.clear();
+    for (const std::vector<HeldPoint>& some :
+         exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), own))) {
+      model.held_points.insert(model.held_points.end(), some.begin(), some.end());
+    }
+  }
+  std::sort(model.held_points.begin(), model.held_points.end(),
+            [](const HeldPoint& a, const HeldPoint& b) { return a.id < b.id; });
+}
+
+}  // namespace
+
 void add_contact_layer(Model& model, std::span<const double> offset) {
   if (model.obstacles.empty()) return;
+  add_held_points(model, offset);
   const std::vector<char> supported = supported_phyxels(model);
   for (Index i = 0; i < model.size(); ++i) {
     if (offset[i] < 0 || supported[i] || !model.owns(i)) continue;
@@ -212,15 +254,52 @@ bool is_deepest_overlap(const Model& model, double depth, Index phyxel, double t
   return id == -largest(-id) && is_here;
 }
 
+namespace {
+
+// The rounding of coordinates, and of surfaces in files in float, as a share of a support.
+constexpr double rounding = 1e-6;
+
+/// The error of a model in which a held point is inside a free body at the start; empty if none is.
+/// Of a share: the same on all ranks.
+std::string held_overlap_at_start(const Model& model, const Scene& scene) {
+  for (const std::size_t o : free_bodies(model)) {
+    const Obstacle& obstacle = model.obstacles[o];
+    const ObstacleStep at = obstacle.placed(obstacle.start);
+    const HeldPoint* deepest = nullptr;
+    double depth = 0;
+    ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
+      for (const HeldPoint& point : model.held_points) {
+        const double here = point.offset - gap_to(shape, at, point.rest).distance;
+        if (!(here > rounding * point.support && here > depth)) continue;
+        deepest = &point;
+        depth = here;
+      }
+    });
+    if (!deepest) continue;
+    const std::string& where = scene.obstacles[o].where;
+    const Vec3d x = deepest->rest;
+    return fmt::format(
+        "{}{}body \"{}\" is {:.3g} m deep in obstacle \"{}\" at the start, at ({:.6g}, {:.6g}, "
+        "{:.6g}) m, by phyxels that supports hold or move, and the obstacle is a free body; "
+        "allowed: to touch it",
+        where, where.empty() ? "" : ": ",
+        scene.bodies[static_cast<std::size_t>(body_of_id(model, deepest->id))].name, depth,
+        obstacle.name, x.x, x.y, x.z);
+  }
+  return {};
+}
+
+}  // namespace
+
 std::string overlap_at_start(const Model& model, const Scene& scene) {
   if (model.obstacles.empty()) return {};
-  if (std::string problem = rigid_overlap_at_start(model, scene); !problem.empty()) {
+  for (const std::string& problem :
+       {rigid_overlap_at_start(model, scene), held_overlap_at_start(model, scene)}) {
+    if (problem.empty()) continue;
     const bool is_first = !model.share || model.share->communicator->rank() == 0;
     return is_first ? problem : "";
   }
   const Deepest found = deepest_of(model);
-  // The rounding of coordinates, and of surfaces in files in float.
-  constexpr double rounding = 1e-6;
   if (!is_deepest_overlap(model, found.depth, found.phyxel, rounding)) return {};
   const Index i = found.phyxel;
   const double depth = found.depth;
@@ -239,6 +318,10 @@ void set_fields(Model& model) {
   for (const Index i : model.contact.phyxels) {
     least = std::min(least, model.neighbourhood.support[i]);
     support = std::max(support, model.neighbourhood.support[i]);
+  }
+  for (const HeldPoint& point : model.held_points) {
+    least = std::min(least, point.support);
+    support = std::max(support, point.support);
   }
   if (model.share) {
     least = model.share->communicator->smallest(least);

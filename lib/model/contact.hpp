@@ -90,7 +90,8 @@ double contact_offset(double distance, double spacing, bool has_layer);
 void add_contact(Model& model, const Scene& scene);
 
 /// Makes the contact layer of a model from the offsets of all its phyxels (`contact_offset`), but
-/// for ghosts, and for those that are held or moved along all axes.
+/// for ghosts, and for those that are held or moved along all axes; these become held points if the
+/// model has free rigid bodies. Of a share: collective.
 void add_contact_layer(Model& model, std::span<const double> offset);
 
 /// Finds the distances from the surfaces of obstacles that are meshes, as finely as phyxels are

@@ -93,9 +93,10 @@ std::vector<SceneKey> obstacle_keys() {
       {.section = "obstacle", .name = "density", .unit = "kg/m^3", .otherwise = "none",
        .range = between(1e-12, stiffest), .meaning = "Makes it a free rigid body, whose mass and inertia are those of its shape: gravity, "
            "bodies and other obstacles move it. Of shapes that hold a volume, with Verlet's steps. For two rigid bodies, friction is the "
-           "geometric mean of theirs, and restitution the larger one, of the bodies as a whole. Phyxels that supports hold along all axes do "
-           "not stop it: where it meets a body held as a whole, an obstacle without a density should stand for that body. A run stops where "
-           "it lies in such phyxels by a quarter of a support at a frame."},
+           "geometric mean of theirs, and restitution the larger one, of the bodies as a whole. Phyxels that supports hold or "
+           "move along all axes stop it as an obstacle on a path does that is as sharp as their surface, with its own friction and restitution; "
+           "it must not overlap them at the start. Where all of a normal lies along axes that a phyxel is held along, while others are free, "
+           "the phyxel stops it by penalties alone."},
       {.section = "obstacle", .name = "velocity", .type = KeyType::vector, .unit = "m/s", .fallback = "[0, 0, 0]",
        .range = within(fastest), .meaning = "Of the centre of mass of a free body at the start."},
       {.section = "obstacle", .name = "spin", .type = KeyType::vector, .unit = "rad/s", .fallback = "[0, 0, 0]",

@@ -17,6 +17,7 @@
 #include "solver/implicit_step.hpp"
 #include "solver/next_step.hpp"
 #include "solver/present_forces.hpp"
+#include "solver/say_diverged.hpp"
 
 namespace phyxel {
 namespace {
@@ -126,49 +127,6 @@ const Part& first_part(const Model& model, std::size_t body) {
   });
 }
 
-/// The smallest support of the phyxels that touch obstacles or bodies [m]. Of a share: collective.
-double smallest_support(const Model& model) {
-  double smallest = HUGE_VAL;
-  for (const ContactLayer* layer : {&model.contact, &model.body_contact.layer}) {
-    for (const Index i : layer->phyxels) {
-      smallest = std::min(smallest, model.neighbourhood.support[i]);
-    }
-  }
-  return model.share ? model.share->communicator->smallest(smallest) : smallest;
-}
-
-/// The fastest waves in the bodies of a model [m/s].
-double fastest_waves(const Model& model) {
-  double fastest = 0;
-  for (const Part& part : model.parts) {
-    fastest = std::max(fastest, pressure_wave_speed(part.material));
-  }
-  return fastest;
-}
-
-/// Ends a run, on all ranks alike.
-[[noreturn]] void say_wrong(const Model& model, const std::string& why) {
-  if (model.share) throw AgreedError(ExitCode::diverged, why);
-  throw DivergedError(why);
-}
-
-/// Ends a run in which the state of a free body is not finite.
-void check_rigid(const Model& model, std::span<const RigidState> rigid) {
-  const std::vector<std::size_t> bodies = free_bodies(model);
-  for (std::size_t k = 0; k < rigid.size(); ++k) {
-    const auto numbers = rigid[k].numbers();
-    if (std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); })) {
-      continue;
-    }
-    say_wrong(
-        model,
-        fmt::format("the simulation diverged: the state of the free body \"{}\" is not finite; "
-                    "it is too light for what it touches, or turns by more than a radian in a "
-                    "step: allowed is a smaller time.step",
-                    model.obstacles[bodies[k]].name));
-  }
-}
-
 /// The depth at which a run ends, in supports: of phyxels in obstacles, and in other bodies.
 constexpr double in_obstacle = 0.25, in_body = 1;
 
@@ -176,13 +134,13 @@ constexpr double in_obstacle = 0.25, in_body = 1;
 void check_held(const Model& model, const HeldOverlaps& overlaps) {
   const auto check = [&](const HeldOverlap& overlap, double allowed, const std::string& where) {
     if (!(overlap.share() > allowed)) return;
-    say_wrong(model,
-              fmt::format("phyxels of body \"{}\" that supports hold or move are {:.3g} m deep in "
-                          "{}, {:.3g} m is allowed, {} of a support: supports press into each "
-                          "other what cannot give way; allowed: motions (body.motion, "
-                          "obstacle.motion) that leave them room",
-                          name_of_body(model, overlap.body), overlap.depth, where,
-                          allowed * overlap.support, allowed));
+    say_diverged(
+        model, fmt::format("phyxels of body \"{}\" that supports hold or move are {:.3g} m deep in "
+                           "{}, {:.3g} m is allowed, {} of a support: supports press into each "
+                           "other what cannot give way; allowed: motions (body.motion, "
+                           "obstacle.motion) that leave them room",
+                           name_of_body(model, overlap.body), overlap.depth, where,
+                           allowed * overlap.support, allowed));
   };
   for (const HeldOverlap& overlap : overlaps.of_bodies) {
     if (overlap.depth == 0) continue;
@@ -206,60 +164,17 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
     const std::string where = !is_body ? fmt::format("obstacle \"{}\"", reading.obstacle)
                               : model.body_contact.self ? "other bodies or other parts of it"
                                                         : "other bodies";
-    say_wrong(model,
-              fmt::format("phyxels{} are up to {:.3g} m deep in {}, {:.3g} of {}, {} of it is "
-                          "allowed: something presses them into it, or they are too fast for the "
-                          "step{}",
-                          whose, reading.depth, where, reading.depth_share,
-                          is_body ? "the smaller support of both" : "their support", allowed,
-                          has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
+    say_diverged(
+        model, fmt::format("phyxels{} are up to {:.3g} m deep in {}, {:.3g} of {}, {} of it is "
+                           "allowed: something presses them into it, or they are too fast for the "
+                           "step{}",
+                           whose, reading.depth, where, reading.depth_share,
+                           is_body ? "the smaller support of both" : "their support", allowed,
+                           has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
   }
 }
 
 }  // namespace
-
-void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
-                          std::span<const RigidState> rigid) {
-  check_rigid(model, rigid);
-  if (touching_count(model) == 0 || solver.method() == Method::equilibrium) return;
-  const double dt = solver.dt(), support = smallest_support(model);
-  if (const double way = 2 * largest_speed * dt; model.body_contact.acts() && way > 0.5 * support) {
-    // No impact that a step resolves does this.
-    if (const double waves = fastest_waves(model); largest_speed > 100 * waves) {
-      say_wrong(
-          model,
-          fmt::format("phyxels move at up to {:.3g} m/s, {:.2g} times as fast as waves in their "
-                      "bodies: something presses phyxels into each other that cannot give way, "
-                      "such as those of supports; allowed: motions that leave them room",
-                      largest_speed, largest_speed / waves));
-    }
-    say_wrong(
-        model,
-        fmt::format("phyxels move at up to {:.3g} m/s, so that two bodies may move by {:.3g} m "
-                    "against each other in a step of {:.3g} s: they might pass through each "
-                    "other unseen; allowed: {:.3g} m, half of a support, by a step of at most "
-                    "{:.3g} s (time.step, time.safety), or lower speeds",
-                    largest_speed, way, dt, 0.5 * support, 0.25 * support / largest_speed));
-  }
-  const PlacedObstacles placed = obstacles_now(model, solver.time(), dt, rigid);
-  for (std::size_t o = 0; o < placed.size(); ++o) {
-    const Obstacle& obstacle = model.obstacles[o];
-    const double of_obstacle = obstacle.largest_speed(placed[o]);
-    const double speed = largest_speed + of_obstacle;
-    const double most = 0.5 * std::min(obstacle.inner_radius(), support);
-    if (!(speed * dt > most)) continue;
-    say_wrong(
-        model,
-        fmt::format("phyxels move at up to {:.3g} m/s and obstacle \"{}\" at {:.3g} m/s, {:.3g} "
-                    "m against each other in a step of {:.3g} s: they might pass through each "
-                    "other unseen; allowed: {:.3g} m, half of {}, by a step of at most {:.3g} s "
-                    "(time.step, time.safety), lower speeds, or a thicker obstacle",
-                    largest_speed, obstacle.name, of_obstacle, speed * dt, dt, most,
-                    obstacle.inner_radius() < support ? "the obstacle's inner radius"
-                                                      : "a support of the phyxels",
-                    most / speed));
-  }
-}
 
 const char* shape_name(const Obstacle& obstacle) {
   return ObstacleShapes::with(

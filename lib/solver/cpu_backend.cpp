@@ -91,7 +91,8 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
 
   std::vector<std::int64_t> step_sums() const override {
     StepSums sums = support_work_.sums();
-    sums.insert(sums.end(), contacts_.sums().begin(), contacts_.sums().end());
+    const StepSums of_obstacles = contacts_.sums();
+    sums.insert(sums.end(), of_obstacles.begin(), of_obstacles.end());
     sums.insert(sums.end(), body_contacts_.sums().begin(), body_contacts_.sums().end());
     return words_of(std::move(sums));
   }

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "model/parts.hpp"
 #include "phyxel/contacts.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/history.hpp"
@@ -182,6 +183,22 @@ void add_penalties(const Model& model, Backend& backend, const Solver& solver, D
   d.angular_momentum += Vec3d{sums[7].value(), sums[8].value(), sums[9].value()};
 }
 
+/// The largest speed of the phyxels of each body of the scene [m/s]. Of a share: collective.
+std::vector<double> speeds_of_bodies(const Model& model, Backend& backend) {
+  State state;
+  backend.download(state);
+  std::vector<double> speeds(count_of_bodies(model));
+  for (const Part& part : model.parts) {
+    for (Index i = part.begin; i < part.owned_end(); ++i) {
+      speeds[part.body] = std::max(speeds[part.body], norm(state.velocity[i]));
+    }
+  }
+  for (double& speed : speeds) {
+    if (model.share) speed = model.share->communicator->largest(speed);
+  }
+  return speeds;
+}
+
 }  // namespace
 
 Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver) {
@@ -199,7 +216,9 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver)
   if (solver.method() == Method::verlet && has_penalties(model)) {
     add_penalties(model, backend, solver, d);
   }
-  check_contact_speeds(model, solver, d.largest_speed, backend.rigid_states());
+  check_contact_speeds(
+      model, solver, d.largest_speed, [&] { return speeds_of_bodies(model, backend); },
+      backend.rigid_states());
   return d;
 }
 

@@ -206,6 +206,8 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
     newton.contact().add_to(balance.obstacles, found.state.displacement, found.state.velocity, 1,
                             rates);
     found.contact = words_of(std::move(rates));
+    found.contact_force = vectors.make();
+    newton.contact().add(balance.obstacles, found.state.displacement, found.contact_force);
   }
   found.residual = report.residual;
   vectors.refresh_ghosts(found.state.displacement);

@@ -11,6 +11,7 @@
 #include "model/body_contact.hpp"
 #include "model/box_overlaps.hpp"
 #include "model/contact_groups.hpp"
+#include "model/parts.hpp"
 #include "model/spatial_hash.hpp"
 #include "phyxel/physics/body_contact.hpp"
 #include "phyxel/physics/obstacles.hpp"
@@ -91,12 +92,6 @@ void for_each_held(const Model& model, const HeldPlaces& places, Each&& each) {
       if (places.is_held(i)) each(i, part.body);
     }
   }
-}
-
-std::size_t count_of_bodies(const Model& model) {
-  Index count = 0;
-  for (const Part& part : model.parts) count = std::max(count, part.body + 1);
-  return static_cast<std::size_t>(count);
 }
 
 /// True of the bodies all of whose phyxels are held. Of a share: collective.

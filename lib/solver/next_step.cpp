@@ -1,5 +1,7 @@
 #include "solver/next_step.hpp"
 
+#include <algorithm>
+#include <map>
 #include <utility>
 
 #include "model/parts.hpp"
@@ -36,6 +38,38 @@ State next_state(const Model& model, const SupportInstant& now, const State& sta
   return next;
 }
 
+/// Begins the step of obstacles from an instant.
+void begin_step(StepContacts& contacts, const SupportInstant& now, const State& state) {
+  contacts.put_rigid(state.rigid, now.dt);
+  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
+  contacts.push(
+      [&](Index i) {
+        return Touched{state.displacement[i], state.velocity[i]};
+      },
+      [](Index, const Touched&) {});  // known in other forces
+}
+
+/// Keeps the phyxels of a state out of obstacles. @param note as of `StepContacts::keep_out`
+template <class Note>
+void keep_out(StepContacts& contacts, State& next, Note&& note) {
+  contacts.keep_out([](Index) { return true; },
+                    [&](Index i) {
+                      return Touched{next.displacement[i], next.velocity[i]};
+                    },
+                    [&](Index i, const Touched& to) {
+                      next.displacement[i] = to.displacement;
+                      next.velocity[i] = to.velocity;
+                    },
+                    note);
+}
+
+/// True if a phyxel of this rank that touches obstacles is held or moved along an axis.
+bool has_held_in_layer(const Model& model) {
+  const std::vector<char> axes = prescribed_axes(model);
+  const std::vector<Index>& layer = model.contact.phyxels;
+  return std::any_of(layer.begin(), layer.end(), [&](Index i) { return axes[i] != 0; });
+}
+
 }  // namespace
 
 std::optional<NextStep> next_step_of_device(Backend& backend, double time, double dt) {
@@ -57,13 +91,7 @@ NextStep next_step(const Model& model, Backend& backend, const SupportInstant& n
       bodies.acts() ? model.body_contact.layer.phyxels : model.contact.phyxels;
   State next = next_state(model, now, state, layer);
   NextStep made;
-  contacts.put_rigid(state.rigid, now.dt);
-  contacts.begin_step(now.time, now.dt, [&](Index i) { return now.velocity[i]; });
-  contacts.push(
-      [&](Index i) {
-        return Touched{state.displacement[i], state.velocity[i]};
-      },
-      [](Index, const Touched&) {});  // known in other forces
+  begin_step(contacts, now, state);
   if (bodies.acts()) {
     const auto of = [](const State& s) {
       return [&s](Index i) { return SurfaceState{s.displacement[i], s.velocity[i]}; };
@@ -87,17 +115,33 @@ NextStep next_step(const Model& model, Backend& backend, const SupportInstant& n
       bodies.for_each_push([&](Index i, Vec3d force) { made.of_bodies[i] -= force; });
     }
   }
-  contacts.keep_out([](Index) { return true; },
-                    [&](Index i) {
-                      return Touched{next.displacement[i], next.velocity[i]};
-                    },
-                    [&](Index i, const Touched& to) {
-                      next.displacement[i] = to.displacement;
-                      next.velocity[i] = to.velocity;
-                    });
+  keep_out(contacts, next, [](Index, const ContactTerms&) {});
   made.sums = contacts.sums();
   made.sums.insert(made.sums.end(), bodies.sums().begin(), bodies.sums().end());
   return made;
+}
+
+std::vector<Vec3d> obstacles_on_supports(const Model& model, Backend& backend,
+                                         const SupportInstant& now, const State& state) {
+  const bool some = has_held_in_layer(model);
+  const bool of_all = model.share ? model.share->communicator->largest(some ? 1 : 0) > 0 : some;
+  if (!of_all && model.held_points.empty()) return {};
+  std::vector<Vec3d> force(static_cast<std::size_t>(model.size()));
+  StepContacts contacts(model, host_threads(backend));
+  State next = next_state(model, now, state, model.contact.phyxels);
+  begin_step(contacts, now, state);
+  keep_out(contacts, next, [&](Index i, const ContactTerms& terms) {
+    force[i] += (1 / now.dt) * terms.whole_impulse();
+  });
+  std::map<Index, Vec3d> on_held;  // by ids [N s]
+  for (const HeldImpulse& on : contacts.on_held_points()) {
+    on_held[on.id] += on.terms.whole_impulse();
+  }
+  for (Index i = 0; i < model.size() && !on_held.empty(); ++i) {
+    const auto found = on_held.find(model.global_id(i));
+    if (found != on_held.end()) force[i] += (1 / now.dt) * found->second;
+  }
+  return force;
 }
 
 }  // namespace phyxel

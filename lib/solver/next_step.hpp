@@ -30,4 +30,13 @@ std::optional<NextStep> next_step_of_device(Backend& backend, double time, doubl
 NextStep next_step(const Model& model, Backend& backend, const SupportInstant& now,
                    const State& state);
 
+/// Finds the forces of obstacles on phyxels that supports hold along some axes or all, which the
+/// forces of the instant do not contain, over the step from an instant [N], shape [n]; empty if
+/// nothing of a model that is held touches obstacles. Along free axes they mean nothing. Of a
+/// share: collective.
+/// @param now instant of `PresentForces`, but with the forces of other bodies, too
+/// @param state the present state
+std::vector<Vec3d> obstacles_on_supports(const Model& model, Backend& backend,
+                                         const SupportInstant& now, const State& state);
+
 }  // namespace phyxel

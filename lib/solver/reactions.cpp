@@ -3,7 +3,7 @@
 #include <limits>
 
 #include "rank_sums.hpp"
-#include "solver/body_penalty.hpp"
+#include "solver/contact_penalty.hpp"
 #include "solver/next_step.hpp"
 #include "solver/present_forces.hpp"
 #include "solver/step_sums.hpp"
@@ -58,23 +58,37 @@ Path rest_of_work(const Motion& motion, const Solver& solver) {
   return rest;
 }
 
-/// All forces but those of supports, with those of other bodies on phyxels that are held [N]. Of a
-/// share: collective.
+/// All forces but those of supports, with those of other bodies and of obstacles on phyxels that
+/// are held [N]. Of a share: collective.
 std::vector<Vec3d> forces_on_supports(const Model& model, Backend& backend, const Solver& solver,
                                       const PresentForces& present) {
   const std::span<const Vec3d> others = present.instant().other_force;
   std::vector<Vec3d> all(others.begin(), others.end());
-  if (!model.body_contact.acts() || !solver.end_force().empty()) return all;
+  if (touching_count(model) == 0 || !solver.end_force().empty()) return all;
   const State& state = present.state();
+  const auto add = [&](const std::vector<Vec3d>& more) {
+    for (std::size_t i = 0; i < more.size(); ++i) all[i] += more[i];
+  };
   if (solver.method() == Method::verlet) {
-    const NextStep next = next_step(model, backend, present.instant(), state);
-    for (std::size_t i = 0; i < all.size(); ++i) all[i] += next.of_bodies[i];
+    if (model.body_contact.acts()) {
+      add(next_step(model, backend, present.instant(), state).of_bodies);
+    }
+    SupportInstant now = present.instant();
+    now.other_force = all;
+    if (!model.obstacles.empty()) add(obstacles_on_supports(model, backend, now, state));
   } else if (solver.method() == Method::equilibrium) {
-    BodyPenalty penalty(model);
-    std::vector<Mat3d> gradient;
-    backend.displacement_gradients(gradient);
-    penalty.linearise(state.displacement, SlipMeasure{}, gradient);
-    penalty.add(state.displacement, all);
+    const std::span<const Vec3d> known = solver.rest_contact_force();
+    for (std::size_t i = 0; i < known.size(); ++i) all[i] += known[i];
+    if (!known.empty()) return all;
+    const double share = solver.steps() > 0 ? 1 : 0;
+    const PlacedObstacles at = obstacles_after(model, share, share);
+    ContactPenalty penalty(model);
+    penalty.linearise(at, state.displacement, SlipMeasure{}, Renewal::all, [&] {
+      std::vector<Mat3d> gradient;
+      backend.displacement_gradients(gradient);
+      return gradient;
+    });
+    penalty.add(at, state.displacement, all);
   }
   return all;
 }

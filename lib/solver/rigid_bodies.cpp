@@ -32,6 +32,7 @@ RigidBodies::RigidBodies(const Model& model)
   for (std::size_t k = 0; k < bodies_.size(); ++k) number_[bodies_[k]] = k;
   steps_.resize(bodies_.size());
   earlier_.resize(terms * bodies_.size());
+  if (!empty()) of_held_points_.resize(ContactTerms::count * model.obstacles.size());
   put({}, 0);
 }
 
@@ -59,11 +60,23 @@ void RigidBodies::begin_step(double time, double dt) {
     state.angular_momentum += std::exchange(state.angular_impulse, {});
   }
   contacts_.resolve(time, dt, start, states_);
+  if (!model_.share || model_.share->communicator->rank() == 0) {  // all ranks have found the same
+    for (const HeldImpulse& on : contacts_.on_held()) {
+      for (int t = 0; t < ContactTerms::count; ++t) {
+        of_held_points_[on.obstacle * ContactTerms::count + t].add(on.terms.value[t]);
+      }
+    }
+  }
   for (std::size_t k = 0; k < bodies_.size(); ++k) {
     const Obstacle& obstacle = model_.obstacles[bodies_[k]];
     states_[k] = drifted(*obstacle.free, states_[k], dt);
     steps_[k] = obstacle.step_between(start[k], states_[k], dt);
   }
+}
+
+StepSums RigidBodies::with_held_points(StepSums sums) const {
+  for (std::size_t s = 0; s < of_held_points_.size(); ++s) sums[s].add(of_held_points_[s]);
+  return sums;
 }
 
 void RigidBodies::act_back(std::span<const ExactSum> sums) {

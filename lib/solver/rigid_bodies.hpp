@@ -13,10 +13,10 @@
 namespace phyxel {
 
 /// Moves free bodies step by step. A step adds gravity to their velocities, keeps them out of each
-/// other and of other obstacles, and moves them; then phyxels are kept out of them, as out of
-/// obstacles on a path, and the impulses of that act back on them in the next step. So phyxels
-/// stick to them as to an obstacle at rest, and both momenta of all bodies are kept to rounding.
-/// All ranks do the same.
+/// other, of other obstacles and of held points, and moves them; then phyxels are kept out of them,
+/// as out of obstacles on a path, and the impulses of that act back on them in the next step. So
+/// phyxels stick to them as to an obstacle at rest, and both momenta of all bodies are kept to
+/// rounding. All ranks do the same.
 class RigidBodies {
  public:
   /// @param model must outlive this
@@ -32,13 +32,14 @@ class RigidBodies {
   /// The state that a step changes.
   struct Kept {
     std::vector<RigidState> states;
-    StepSums earlier;
+    StepSums earlier, of_held_points;
   };
-  Kept kept() const { return {states_, earlier_}; }
+  Kept kept() const { return {states_, earlier_, of_held_points_}; }
   /// Returns to a kept state.
   void put_back(Kept kept) {
     states_ = std::move(kept.states);
     earlier_ = std::move(kept.earlier);
+    of_held_points_ = std::move(kept.of_held_points);
   }
 
   /// Moves the bodies over the step from `time` [s].
@@ -54,6 +55,10 @@ class RigidBodies {
   /// Lets what obstacles have done to phyxels since the last call act back. Of a share: collective.
   /// @param sums of all obstacles and steps so far, of this rank (`ContactTerms`)
   void act_back(std::span<const ExactSum> sums);
+  /// Adds what bodies have done to held points to such sums of all obstacles.
+  StepSums with_held_points(StepSums sums) const;
+  /// The impulses on held points of the last `begin_step`.
+  const std::vector<HeldImpulse>& on_held_points() const { return contacts_.on_held(); }
 
  private:
   const Model& model_;
@@ -62,6 +67,7 @@ class RigidBodies {
   std::vector<RigidState> states_;
   std::vector<ObstacleStep> steps_;  // of the present step
   StepSums earlier_;                 // impulses and angular impulses at the last call of `act_back`
+  StepSums of_held_points_;          // so far, of all obstacles; on the first of several ranks
   RigidContacts contacts_;
 };
 

@@ -35,53 +35,73 @@ double kinetic_energy(const RigidMass& mass, const RigidState& state) {
 }
 
 RigidContacts::RigidContacts(const Model& model)
-    : model_(model), free_(free_bodies(model)), tips_(model) {}
+    : model_(model), free_(free_bodies(model)), tips_(model), held_(model) {}
 
-void RigidContacts::add_touch(const Placed& of_tips, const Placed& other, Vec3d end, const Gap& gap,
-                              double dt, std::span<const RigidState> start,
-                              std::span<const RigidState> states) {
-  const Obstacle &first = model_.obstacles[of_tips.obstacle],
-                 &second = model_.obstacles[other.obstacle];
-  const int anchor = of_tips.free >= 0 ? of_tips.free : other.free;
-  const ContactLaw law = law_of(first.law, second.law);
+RigidContacts::Side RigidContacts::side_of(const Placed& body, Vec3d end) {
+  if (body.free >= 0) return {.free = body.free};
+  return {.velocity = surface_velocity(body.step, end), .start = rigid_velocity(body.step, end)};
+}
+
+RigidContacts::Touch& RigidContacts::add_touch(const Side& first, const Side& second,
+                                               const ContactLaw& law, Vec3d end, const Gap& gap,
+                                               double dt, std::span<const RigidState> start,
+                                               std::span<const RigidState> states) {
+  const int anchor = first.free >= 0 ? first.free : second.free;
   const auto velocity_of = [&](int free, std::span<const RigidState> of, Vec3d arm) {
     const RigidMass& mass = *model_.obstacles[free_[free]].free;
     return of[free].velocity + cross(angular_velocity(mass.inertia, of[free]), arm);
   };
   // Where bodies touch, before the free one moves.
   const Vec3d at = end - dt * states[anchor].velocity;
-  Touch touch{.first = of_tips.free, .second = other.free, .normal = gap.normal, .law = law};
+  Touch touch{.first = first.free, .second = second.free, .normal = gap.normal, .law = law};
   Vec3d now, before;
-  const auto add = [&](const Placed& body, double sign, Vec3d& arm) {
-    if (body.free < 0) {
-      touch.given += sign * surface_velocity(body.step, end);
-      now += sign * surface_velocity(body.step, end);
-      before += sign * rigid_velocity(body.step, end);
+  const auto add = [&](const Side& side, double sign, Vec3d& arm) {
+    if (side.free < 0) {
+      touch.given += sign * side.velocity;
+      now += sign * side.velocity;
+      before += sign * side.start;
       return;
     }
-    arm = at - states[body.free].place;
-    now += sign * velocity_of(body.free, states, arm);
-    before += sign * velocity_of(body.free, start, arm);
+    arm = at - states[side.free].place;
+    now += sign * velocity_of(side.free, states, arm);
+    before += sign * velocity_of(side.free, start, arm);
   };
-  add(of_tips, 1, touch.arm);
-  add(other, -1, touch.other_arm);
+  add(first, 1, touch.arm);
+  add(second, -1, touch.other_arm);
   const SurfaceTouch as_surface{.is_inside = true, .gap = gap.distance, .normal = gap.normal};
   touch.target = target_velocity(as_surface, now, before, law, {.rate = recovery_in_step / dt}, dt);
-  touches_.push_back(touch);
+  return touches_.emplace_back(touch);
 }
 
 void RigidContacts::find_touches(double time, double dt, std::span<const RigidState> start,
                                  std::span<const RigidState> states) {
   touches_.clear();
+  const auto after_step = [&](std::size_t k) {
+    const Obstacle& obstacle = model_.obstacles[free_[k]];
+    return obstacle.placed(drifted(*obstacle.free, states[k], dt));
+  };
   std::size_t free = 0;
   tips_.place([&](std::size_t o) {
     const Obstacle& obstacle = model_.obstacles[o];
-    return obstacle.free ? obstacle.placed(drifted(*obstacle.free, states[free++], dt))
-                         : obstacle.step_from(time, dt);
+    return obstacle.free ? after_step(free++) : obstacle.step_from(time, dt);
   });
   tips_.for_each_inside([&](const Placed& of_tips, const Placed& other, Vec3d end, const Gap& gap) {
-    add_touch(of_tips, other, end, gap, dt, start, states);
+    const ContactLaw law =
+        law_of(model_.obstacles[of_tips.obstacle].law, model_.obstacles[other.obstacle].law);
+    add_touch(side_of(of_tips, end), side_of(other, end), law, end, gap, dt, start, states);
   });
+  held_.place(time, dt);
+  for (std::size_t k = 0; k < free_.size(); ++k) {
+    const Obstacle& obstacle = model_.obstacles[free_[k]];
+    held_.for_each_inside(obstacle, after_step(k),
+                          [&](const HeldPoint& point, Vec3d x, Vec3d velocity, const Gap& gap) {
+                            Touch& touch =
+                                add_touch({.velocity = velocity, .start = velocity},
+                                          {.free = static_cast<int>(k)}, obstacle.law,
+                                          x - point.offset * gap.normal, gap, dt, start, states);
+                            touch.held = point.id;
+                          });
+  }
 }
 
 void RigidContacts::sweep_all(double speed, std::vector<Moving>& moving) {
@@ -132,18 +152,8 @@ void RigidContacts::sweep_all(double speed, std::vector<Moving>& moving) {
   }
 }
 
-void RigidContacts::resolve(double time, double dt, std::span<const RigidState> start,
-                            std::vector<RigidState>& states) {
-  if (free_.empty()) return;
-  find_touches(time, dt, start, states);
-  if (touches_.empty()) return;
-  std::vector<Moving> moving;
-  for (std::size_t k = 0; k < free_.size(); ++k) {
-    const RigidMass& mass = *model_.obstacles[free_[k]].free;
-    moving.push_back({states[k].velocity, angular_velocity(mass.inertia, states[k]), 1 / mass.mass,
-                      turned(rotation_of(states[k].turn), inverse(mass.inertia))});
-  }
-  double speed = 0;  // by which changes count as small [m/s]
+double RigidContacts::find_mobilities(const std::vector<Moving>& moving) {
+  double speed = 0;
   for (Touch& t : touches_) {
     const auto response = [&](Vec3d way, Vec3d along) {  // of the velocity along to an impulse
       double sum = 0;
@@ -166,24 +176,62 @@ void RigidContacts::resolve(double time, double dt, std::span<const RigidState> 
       if (body >= 0) speed = std::max(speed, norm(moving[body].velocity));
     }
   }
-  sweep_all(speed, moving);
+  return speed;
+}
+
+void RigidContacts::add_impulses(std::vector<RigidState>& states) const {
   for (const Touch& t : touches_) {
-    const Vec3d impulse = t.push * t.normal + t.hold_a * t.a + t.hold_b * t.b;
-    const auto add = [&](int body, Vec3d arm, Vec3d j) {
+    const auto add = [&](int body, Vec3d arm, Vec3d impulse) {
       if (body < 0) return;
-      RigidState& state = states[body];
-      const RigidMass& mass = *model_.obstacles[free_[body]].free;
-      state.loss += kinetic_energy(mass, state);
-      state.velocity += (1 / mass.mass) * j;
-      state.angular_momentum += cross(arm, j);
-      state.loss -= kinetic_energy(mass, state);
+      states[body].velocity += (1 / model_.obstacles[free_[body]].free->mass) * impulse;
+      states[body].angular_momentum += cross(arm, impulse);
     };
-    add(t.first, t.arm, impulse);
-    add(t.second, t.other_arm, -impulse);
-    // What paths do is no loss.
-    const double work = -dot(impulse, t.given);
-    states[t.first >= 0 ? t.first : t.second].loss -= work;
+    add(t.first, t.arm, t.impulse());
+    add(t.second, t.other_arm, -t.impulse());
   }
+}
+
+void RigidContacts::add_losses(std::span<const RigidState> start, std::vector<RigidState>& states) {
+  for (const Touch& t : touches_) {
+    const auto mean_of = [&](int body, Vec3d arm) {
+      if (body < 0) return Vec3d{};
+      const Sym3d& inertia = model_.obstacles[free_[body]].free->inertia;
+      Vec3d sum;
+      for (const RigidState& state : {start[body], states[body]}) {
+        sum += state.velocity + cross(angular_velocity(inertia, state), arm);
+      }
+      return 0.5 * sum;
+    };
+    const Vec3d second = mean_of(t.second, t.other_arm);
+    const Vec3d relative = t.given + mean_of(t.first, t.arm) - second;
+    if (t.held < 0) {
+      states[t.first >= 0 ? t.first : t.second].loss -= dot(t.impulse(), relative);
+      continue;
+    }
+    const std::size_t o = free_[t.second];
+    HeldImpulse found{.id = t.held, .obstacle = o, .terms = {}};
+    found.terms.set(t.normal_impulse(), t.tangential_impulse(),
+                    states[t.second].place + t.other_arm - model_.obstacles[o].place, second,
+                    relative);
+    on_held_.push_back(found);
+  }
+}
+
+void RigidContacts::resolve(double time, double dt, std::span<const RigidState> start,
+                            std::vector<RigidState>& states) {
+  on_held_.clear();
+  if (free_.empty()) return;
+  find_touches(time, dt, start, states);
+  if (touches_.empty()) return;
+  std::vector<Moving> moving;
+  for (std::size_t k = 0; k < free_.size(); ++k) {
+    const RigidMass& mass = *model_.obstacles[free_[k]].free;
+    moving.push_back({states[k].velocity, angular_velocity(mass.inertia, states[k]), 1 / mass.mass,
+                      turned(rotation_of(states[k].turn), inverse(mass.inertia))});
+  }
+  sweep_all(find_mobilities(moving), moving);
+  add_impulses(states);
+  add_losses(start, states);
 }
 
 }  // namespace phyxel

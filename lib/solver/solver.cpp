@@ -186,6 +186,7 @@ void Solver::step_by_newton() {
       rest_ = {found.evaluations, found.steps, found.residual};
       rest_contact_.clear();
       add_words(rest_contact_, found.contact);
+      rest_contact_force_ = found.contact_force;
       break;
     }
   }

@@ -128,6 +128,11 @@ class StepContacts {
   /// @param get,set return and replace the state of a phyxel
   template <class IsMeant, class Get, class Set>
   void keep_out(IsMeant&& is_meant, Get&& get, Set&& set) {
+    keep_out(is_meant, get, set, [](Index, const ContactTerms&) {});
+  }
+  /// The same. @param note is told what an obstacle does to a phyxel
+  template <class IsMeant, class Get, class Set, class Note>
+  void keep_out(IsMeant&& is_meant, Get&& get, Set&& set, Note&& note) {
     if (model_.obstacles.empty()) return;
     each_touch(
         steps_, is_meant, get,
@@ -136,13 +141,17 @@ class StepContacts {
           return !(obstacle.penalty > 0) || obstacle.law.static_friction > 0;
         },
         [&](const auto& shape, std::size_t o, std::size_t k, ContactTerms& terms) {
-          return keep_out_of(shape, o, k, get, set, terms);
+          if (!keep_out_of(shape, o, k, get, set, terms)) return false;
+          note(model_.contact.phyxels[k], terms);
+          return true;
         });
   }
   /// Ends a step, after all phyxels have been kept out. Of a share: collective.
   void end_step() { rigid_.act_back(sums_); }
   /// The sums so far, obstacle by obstacle (`ContactTerms`).
-  const StepSums& sums() const { return sums_; }
+  StepSums sums() const { return rigid_.with_held_points(sums_); }
+  /// What free bodies do to held points in the present step.
+  const std::vector<HeldImpulse>& on_held_points() const { return rigid_.on_held_points(); }
   /// Bytes of its arrays.
   std::size_t bytes() const {
     std::size_t distances = 0;
@@ -162,8 +171,8 @@ class StepContacts {
     const auto by = [&](const auto& shape, std::size_t o, std::size_t k, ContactTerms& terms) {
       const Index i = model_.contact.phyxels[k];
       const Touched now = get(i);
-      const Vec3d change = penalty_change(shape, starts_[o], pushed(o, k, now), terms);
-      if (change == Vec3d{}) return false;
+      Vec3d change;
+      if (!penalty_change(shape, starts_[o], pushed(o, k, now), change, terms)) return false;
       set(i, {now.displacement, now.velocity + change});
       return true;
     };

@@ -34,6 +34,26 @@ TEST_F(Mpirun, FreeBodiesMoveTheSameOnAllRanks) {
   }
 }
 
+TEST_F(Mpirun, FreeBodiesMoveTheSameOnHeldPhyxelsOfAllRanks) {
+  // A box lands on a block whose upper part is held, sliding, beside its middle.
+  write("scene.toml",
+        "gravity = [0, 0, -9.81]\n[time]\nend = 0.1\n[solver]\nprecision = 'double'\n"
+        "[output]\nframes_per_second = 50\n"
+        "[[obstacle]]\nname = 'box'\nshape = 'box'\nsize = [0.2, 0.2, 0.05]\ndensity = 1000\n"
+        "friction = 0.3\ntranslation = [0.02, 0.01, 0.13]\nvelocity = [0.5, 0, 0]\n"
+        "[[body]]\nname = 'block'\nshape = 'block'\nsize = [0.4, 0.4, 0.2]\nspacing = 0.05\n"
+        "lattice = 'nodes'\n[body.material]\nyoung = 1e6\npoisson = 0.3\ndensity = 1000\n"
+        "[[body.fixed]]\nbox = [[-1, -1, 0.04], [1, 1, 1]]\n");
+  const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});
+  ASSERT_EQ(alone.code, 0) << alone.err;
+  for (const int ranks : {2, 3}) {
+    const std::string other = "on" + std::to_string(ranks);
+    const Outcome outcome = run_on(ranks, {"run", "scene.toml", "--out", other});
+    ASSERT_EQ(outcome.code, 0) << outcome.err;
+    expect_same_files("alone", other);
+  }
+}
+
 TEST_F(Mpirun, AFreeBodyInTheFloorIsRefusedOnce) {
   write("scene.toml",
         "[time]\nend = 0.1\n[contact]\n[[obstacle]]\nname = 'floor'\nshape = 'plane'\n"

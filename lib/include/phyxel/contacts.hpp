@@ -1,6 +1,7 @@
 /// Forces and work of obstacles, and of bodies on each other.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -70,13 +71,18 @@ const char* shape_name(const Obstacle& obstacle);
 std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
                                           const Solver& solver);
 
-/// Refuses speeds at which phyxels and obstacles might pass through each other in a step: more than
-/// half of the obstacle's inner radius, or of a support. Of a share: collective.
+/// Refuses speeds at which bodies and obstacles might pass through each other in a step: pairs that
+/// move against each other by more than half of the obstacle's inner radius, or of the smallest
+/// support of the phyxels by which the pair touches. Of a share: collective.
 /// @param largest_speed of the phyxels of all ranks [m/s]
+/// @param speeds_of_bodies returns the largest speed of each body's phyxels [m/s], of all ranks;
+/// not called where no pair can be too fast
 /// @param rigid states of the free bodies
-/// @throws DivergedError naming the obstacle, the speeds, and the largest step allowed; or the free
-///   body whose state is not finite
+/// @throws DivergedError naming the pair, its speeds, and the largest step allowed; or the free
+/// body
+///   whose state is not finite
 void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
+                          const std::function<std::vector<double>()>& speeds_of_bodies,
                           std::span<const RigidState> rigid);
 
 /// A number of a reading: a column of `contacts.csv`.

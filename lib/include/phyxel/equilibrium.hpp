@@ -45,6 +45,8 @@ struct Equilibrium {
   /// What each obstacle and body would do in a second, on the phyxels of this rank, as words of
   /// exact sums (`ContactTerms`); empty without friction, where it follows from the state.
   std::vector<std::int64_t> contact = {};
+  /// Forces of obstacles and bodies on the phyxels of this rank [N], shape [n]; likewise.
+  std::vector<Vec3d> contact_force = {};
 };
 
 /// Finds a state in which the forces on each free phyxel vanish, under gravity, full loads, and

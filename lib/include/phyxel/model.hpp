@@ -175,6 +175,15 @@ struct ContactLayer {
   std::vector<double> offset;  ///< Distance of each from its body's surface [m]; 0: it lies on it.
 };
 
+/// A point of a body's surface that supports hold or move along all axes.
+struct HeldPoint {
+  Index id = 0;          ///< Index of its phyxel in the whole model.
+  Index motion[3] = {};  ///< Number of the motion that it follows along each axis.
+  Vec3d rest;            ///< [m]
+  double offset = 0;     ///< As of `ContactLayer` [m].
+  double support = 0;    ///< [m]
+};
+
 /// Distances from the surface of a body at rest. Bodies that are copies of each other share the
 /// arrays.
 struct BodyDistances {
@@ -286,6 +295,9 @@ struct Model {
   std::vector<Load> loads;
   std::vector<Obstacle> obstacles;
   ContactLayer contact;
+  /// The points that stop free rigid bodies as nothing else does, by ascending ids; of a share
+  /// those of all ranks. None in models without such bodies.
+  std::vector<HeldPoint> held_points;
   BodyContact body_contact;
   std::vector<Following> following;  ///< Of loads that follow the surface, in their order.
   std::vector<Probe> probes;

@@ -157,6 +157,9 @@ class Solver {
   /// implicit step, or where a search has found rest with friction, as exact sums (`ContactTerms`);
   /// empty before that, and for other methods.
   std::span<const ExactSum> end_contact() const;
+  /// Forces of obstacles and bodies [N] where a search has found rest with friction, shape [n];
+  /// empty before that, without friction, and for other methods.
+  std::span<const Vec3d> rest_contact_force() const { return rest_contact_force_; }
   /// Sums over all steps since t = 0 and all ranks, as words of exact sums. First the work [J] that
   /// the support of each motion has done, shape [motions, words]; none if no support moves. Then
   /// what each obstacle has done (`ContactTerms`), shape [obstacles, 9, words]. Each step adds the
@@ -185,6 +188,7 @@ class Solver {
   bool begun_ = false;                  ///< The start is that of an interrupted search for rest.
   SolverWork rest_;                     ///< Of the search for rest.
   std::vector<ExactSum> rest_contact_;  ///< Of `end_contact`, after a search for rest.
+  std::vector<Vec3d> rest_contact_force_;
   // Work of supports, as words: that of the start, of all ranks; that of the backend before this
   // solver began; and corrections where the step changed, the last two of this rank.
   std::vector<std::int64_t> work_before_, work_of_backend_, work_of_changes_;

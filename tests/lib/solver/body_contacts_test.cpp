@@ -476,7 +476,8 @@ TEST(BodyContacts, OfBodiesThatAreTooFastAreRefusedWithTheCause) {
   const double waves = pressure_wave_speed(way.model.parts[0].material);
   const auto message_at = [&](double speed) -> std::string {
     try {
-      check_contact_speeds(way.model, way.solver, speed, {});
+      check_contact_speeds(way.model, way.solver, speed,
+                           [&] { return std::vector<double>(2, speed); }, {});
     } catch (const DivergedError& error) {
       return error.what();
     }

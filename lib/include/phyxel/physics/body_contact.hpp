@@ -450,7 +450,8 @@ struct SurfaceForce {
   }
 };
 
-/// Adds Coulomb's friction to the normal part of a force. @param velocity as of `surface_force`
+/// Adds Coulomb's friction to the normal part of a force, also where supports hold both bodies
+/// along the slip (`give_of_prescribed`). @param velocity as of `surface_force`
 PHYXEL_HD void add_friction(const SurfaceTouch& touch, const SurfaceResponse& response,
                             Vec3<double> velocity, const ContactLaw& law, SurfaceForce& force) {
   if (!(law.static_friction > 0)) return;
@@ -458,7 +459,9 @@ PHYXEL_HD void add_friction(const SurfaceTouch& touch, const SurfaceResponse& re
   const double speed = std::sqrt(dot(slip, slip));
   if (!(speed > 0)) return;
   const Vec3<double> way = (1 / speed) * slip;
-  const double sideways = mobility_along(response.mobility, way);
+  const double along_slip = mobility_along(response.mobility, way);
+  const double least = give_of_prescribed * mobility_along(response.mobility, touch.normal);
+  const double sideways = along_slip > least ? along_slip : least;
   if (!(sideways > 0)) return;
   const double stop = speed / sideways, hold = law.kinetic_friction * force.push;
   const double size = stop <= law.static_friction * force.push || stop < hold ? stop : hold;

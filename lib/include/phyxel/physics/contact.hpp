@@ -31,7 +31,8 @@ struct ContactPoint {
   Vec3<double> free;    ///< 1 along axes on which the point is free, 0 along prescribed ones.
 };
 
-/// The changes of a point's velocity by contact over a step [m/s].
+/// The force of contact on a point times the step over its mass [m/s]: the change of the point's
+/// velocity along free axes, while supports bear what acts along the others.
 struct ContactChange {
   Vec3<double> normal, tangential;
 };
@@ -41,29 +42,38 @@ PHYXEL_HD Vec3<double> freed(const Vec3<double>& free, const Vec3<double>& v) {
   return {v.x * free.x, v.y * free.y, v.z * free.z};
 }
 
-/// The change of a point's velocity by Coulomb's friction [m/s], -v_t/|v_t| min(μ push, |v_t|).
+/// How far a point gives way along prescribed axes in friction, over what it does along free ones.
+/// No force stops a slip that supports impose: there friction is whole from a slip of a hundredth
+/// of the one that it would stop on a free point. From less on, rounding would rub; from more on,
+/// supports that move slowly would feel less than they should.
+inline constexpr double give_of_prescribed = 0.01;
+
+/// Coulomb's friction on a point, as of `ContactChange`: -v_t/|v_t| min(μ push, |v_t|/d), where
+/// d = 1 for a slip along free axes, and `give_of_prescribed` for one along prescribed axes.
 /// @param velocity v relative to the surface, after all other forces [m/s]
-/// @param push the change of velocity by the normal force [m/s]. @param free as of `ContactPoint`
+/// @param free as of `ContactPoint`. @param push the normal force, likewise [m/s]
 PHYXEL_HD Vec3<double> friction_change(Vec3<double> velocity, Vec3<double> normal,
                                        const Vec3<double>& free, double push,
                                        const ContactLaw& law) {
-  const Vec3<double> slip = freed(free, velocity - dot(velocity, normal) * normal);
-  const double speed = std::sqrt(dot(slip, slip));
-  if (!(speed > 0)) return {};
-  const bool sticks = speed <= law.static_friction * push;
-  const double hold = law.kinetic_friction * push;
-  const double part = sticks || hold > speed ? 1.0 : hold / speed;
-  return -part * slip;
+  const Vec3<double> slip = velocity - dot(velocity, normal) * normal;
+  const double square = dot(slip, slip), speed = std::sqrt(square);
+  if (!(square > 0)) return {};
+  const double movable = dot(freed(free, slip), slip) / square;
+  const double whole = 1 / (movable + give_of_prescribed * (1 - movable));  // what stops it
+  const double stop = whole * speed, hold = law.kinetic_friction * push;
+  const bool sticks = stop <= law.static_friction * push || stop < hold;
+  return -(sticks ? whole : hold / speed) * slip;
 }
 
-/// The change of velocity that brings a point at a distance g < 0 from an obstacle onto its surface
-/// at the end of the step,
+/// The force that brings a point at a distance g < 0 from an obstacle onto its surface at the end
+/// of the step, as of `ContactChange`,
 ///
-///   Δv_n = max(-g/Δt, -(1 + e) n · v⁻) n,   Δv_t = -v_t/|v_t| min(μ Δv_n, |v_t|),
+///   Δv_n = max(-g/Δt, -(1 + e) n · v⁻)/s n,   Δv_t = -v_t/|v_t| min(μ Δv_n, |v_t|),
 ///
-/// where v⁻ is the relative velocity before the step, and v_t the tangential one after all other
-/// forces. Along prescribed axes nothing changes. Where n is almost along those, a step makes good
-/// a part of the gap alone, since the free axes would have to move by far more than the gap.
+/// where v⁻ is the relative velocity before the step, v_t the tangential one after all other
+/// forces, and s = n · F n, with 1 in F along free axes and 0 along others, makes the free axes do
+/// what prescribed ones cannot. Where n is almost along those, a step makes good a part of the gap
+/// alone, since the free axes would have to move by far more than the gap.
 /// @param gap with a negative distance. @param dt size of the step [s]
 PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point,
                                        const ContactLaw& law, double dt) {
@@ -78,9 +88,9 @@ PHYXEL_HD ContactChange contact_change(const Gap& gap, const ContactPoint& point
   }
   constexpr double least = 0.1;
   const double push = rate / (share > least ? share : least);  // force times Δt/m
-  ContactChange change{push * way, {}};
+  ContactChange change{push * n, {}};
   if (!(law.static_friction > 0)) return change;
-  change.tangential = friction_change(point.velocity + change.normal, n, point.free, push, law);
+  change.tangential = friction_change(point.velocity + push * way, n, point.free, push, law);
   return change;
 }
 
@@ -138,6 +148,10 @@ struct ContactTerms {
   enum { impulse = 0, moment = 3, work = 6, friction_heat, impact_loss, count };
   double value[count] = {};
 
+  /// The impulse on the point [N s].
+  PHYXEL_HD Vec3<double> whole_impulse() const {
+    return {value[impulse], value[impulse + 1], value[impulse + 2]};
+  }
   /// Sets the terms of an impulse, `normal` and `tangential` [N s], on a point.
   /// @param arm from the obstacle's place at rest to where the impulse acts [m]
   /// @param surface,relative velocity of the obstacle's surface there, and that of the point
@@ -181,7 +195,7 @@ PHYXEL_HD bool touch(const Shape& shape, const ObstacleStep& obstacle, TouchingP
   const Vec3<double> mean = rigid_velocity(obstacle, point.position);
   const ContactChange change = contact_change(
       gap, {point.velocity - surface, point.before - mean, point.free}, obstacle.law, obstacle.dt);
-  const Vec3<double> all = change.normal + change.tangential;
+  const Vec3<double> all = freed(point.free, change.normal + change.tangential);
   const Vec3<double> start = point.position - obstacle.dt * point.velocity;
   point.velocity += all;
   point.position += obstacle.dt * all;

@@ -44,19 +44,21 @@ struct PushedPoint {
   double inertia = 0;     ///< Force over the change of velocity that the step starts with [kg/s].
 };
 
-/// The change of the velocity with which a step starts by the penalty of an obstacle [m/s].
+/// Finds the change of the velocity with which a step starts by the penalty of an obstacle [m/s],
+/// and returns true, if the point is inside.
 /// @param obstacle where it is as the step starts
 /// @param terms receives what is added to the obstacle's sums
 template <class Shape>
-PHYXEL_HD Vec3<double> penalty_change(const Shape& shape, const ObstacleStep& obstacle,
-                                      const PushedPoint& point, ContactTerms& terms) {
+PHYXEL_HD bool penalty_change(const Shape& shape, const ObstacleStep& obstacle,
+                              const PushedPoint& point, Vec3<double>& change, ContactTerms& terms) {
   Gap gap = gap_to(shape, obstacle, point.position);
   gap.distance -= point.offset;
-  if (!(gap.distance < 0)) return {};
-  const Vec3<double> force = freed(point.free, penalty_force(gap, point.stiffness).force);
+  if (!(gap.distance < 0)) return false;
+  const Vec3<double> force = penalty_force(gap, point.stiffness).force;
   terms.set(obstacle.dt * force, {}, point.position - obstacle.place_at_rest,
             rigid_velocity(obstacle, point.position), {});
-  return (1 / point.inertia) * force;
+  change = (1 / point.inertia) * freed(point.free, force);
+  return true;
 }
 
 /// Lets a point at the end of a step rub on an obstacle whose penalty pushes it: changes its
@@ -74,8 +76,9 @@ PHYXEL_HD bool rub(const Shape& shape, const ObstacleStep& obstacle, double stif
   const Vec3<double> change =
       friction_change(point.velocity - surface, gap.normal, point.free, push, obstacle.law);
   const Vec3<double> start = point.position - obstacle.dt * point.velocity;
-  point.velocity += change;
-  point.position += obstacle.dt * change;
+  const Vec3<double> all = freed(point.free, change);
+  point.velocity += all;
+  point.position += obstacle.dt * all;
   terms.set({}, point.inertia * obstacle.dt * change, start - obstacle.place_at_rest, mean,
             0.5 * (point.before + point.velocity) - mean);
   return true;
