@@ -1,3 +1,6 @@
+#include <cooperative_groups.h>
+#include <cooperative_groups/scan.h>
+
 #include <utility>
 
 #include "setup/contact_rows.cuh"
@@ -14,30 +17,35 @@ struct Near {
   HashView hash;
   const ContactCandidate* points;
   const Index* body;  ///< The body of each candidate.
-  double reach;
+  double range;       ///< The largest one [m].
 
-  /// Calls visit(k) for each candidate in the lists of a point.
+  /// Calls visit(k) for each candidate in the lists of a point, by one of the threads that share
+  /// it.
   template <class Visit>
-  __device__ void each(Index p, Visit&& visit) const {
+  __device__ void each(Index p, int thread, int threads, Visit&& visit) const {
     const ContactCandidate& point = points[p];
     const Vec3d now = point.now;
+    const double reach = range + layer.skins[point.body];
     const bool touches_itself = layer.partner_of(point.body, point.body) >= 0;
-    hash.visit_near(0, now, reach, [&](std::uint32_t entry, const Vec3d& there) {
+    const auto look = [&](std::uint32_t entry, const Vec3d& there) {
       // Most entries of the cells are too far from any point to be looked at.
       if (const Vec3d way = there - now; dot(way, way) > reach * reach) return;
       const Index k = hash.index[entry];
       // Most of the others are of the same body.
       if (body[k] == point.body && !touches_itself) return;
       const ContactCandidate& other = points[k];
-      if (!is_near(point, other, layer.skin)) return;
+      if (!is_near(point, other, layer.skins)) return;
       if (layer.partner_of(point.body, other.body) >= 0) visit(k);
-    });
+    };
+    hash.visit_part_of_near(0, now, reach, thread, threads, look);
   }
 };
 
-/// Finds the entries of points, in any order, and counts them. Each thread keeps some entries
-/// before it asks for a place in memory, since all threads count with the same number.
+/// Finds the entries of points, in any order, and counts them: some threads for each point. A warp
+/// asks for places in memory once, since all threads count with the same number.
 struct FindEntries {
+  static constexpr int threads = 8;  ///< Of a point.
+
   Near near;
   const Index* order;  ///< Place of each candidate in `by_list`.
   std::uint64_t points;
@@ -45,22 +53,28 @@ struct FindEntries {
   std::uint64_t room;
   unsigned long long* count;  ///< Receives the number of all entries.
 
-  __device__ void operator()(std::int64_t p) const {
-    constexpr int most = 32;
+  __device__ void operator()(std::int64_t i) const {
+    constexpr int most = 16;
+    const std::int64_t p = i / threads;
     std::uint64_t some[most];
     int held = 0;
-    const auto put = [&] {
-      const unsigned long long first = atomicAdd(count, static_cast<unsigned long long>(held));
+    const auto put = [&](unsigned long long first) {
       for (int e = 0; e < held; ++e) {
         if (first + e < room) keys[first + e] = some[e];
       }
       held = 0;
     };
-    near.each(static_cast<Index>(p), [&](Index k) {
+    near.each(static_cast<Index>(p), static_cast<int>(i % threads), threads, [&](Index k) {
       some[held++] = static_cast<std::uint64_t>(p) * points + static_cast<std::uint64_t>(order[k]);
-      if (held == most) put();
+      if (held == most) put(atomicAdd(count, static_cast<unsigned long long>(most)));
     });
-    if (held > 0) put();
+    const auto warp = cooperative_groups::coalesced_threads();
+    const int before = cooperative_groups::exclusive_scan(warp, held);
+    unsigned long long first = 0;
+    if (warp.thread_rank() + 1 == warp.size()) {
+      first = atomicAdd(count, static_cast<unsigned long long>(before + held));
+    }
+    put(warp.shfl(first, warp.size() - 1) + static_cast<unsigned long long>(before));
   }
 };
 
@@ -241,16 +255,15 @@ DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerVi
              body[p] = points[p].body;
              order[by_list[p]] = static_cast<Index>(p);
            });
-  const double reach = extent.range + layer.skin;
-  const DeviceHash hash(now, extent.box, reach);
-  const Near near{layer, hash.view(), points.data(), body.data(), reach};
+  const DeviceHash hash(now, extent.box, extent.range + layer.most_skin);
+  const Near near{layer, hash.view(), points.data(), body.data(), extent.range};
   if (room == 0) room = n;
   DeviceArray<std::uint64_t> keys;
   for (bool had_room = false; !had_room;) {
     keys = {};
     keys = {room, name};
     facts.clear();
-    for_each("find_entries", count_of(n),
+    for_each("find_entries", FindEntries::threads * count_of(n),
              FindEntries{near, order.data(), n, keys.data(), room, &facts.view()->entries});
     const auto count = static_cast<std::size_t>(facts.read().entries);
     had_room = count <= room;

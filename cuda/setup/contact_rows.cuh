@@ -23,7 +23,8 @@ struct LayerView {
   const Offset* partner_start;
   const Index* partner;
   const ContactLaw* law;  ///< Of partners.
-  double skin;
+  const double* skins;    ///< Of bodies [m].
+  double most_skin;       ///< The largest one [m].
   int rank;
 
   /// The number of a body among the partners of all; -1 if two do not touch.
@@ -35,6 +36,7 @@ struct LayerView {
   }
   __device__ bool is_near_others(Index k) const {
     for (Offset p = partner_start[body[k]]; p < partner_start[body[k] + 1]; ++p) {
+      const double skin = skin_of(skins, body[k], partner[p]);
       if (may_be_near(position[k], site[k].range, skin, box[partner[p]])) return true;
     }
     return false;

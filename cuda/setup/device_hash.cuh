@@ -69,17 +69,24 @@ struct HashView {
   /// farther ones.
   template <class Visit>
   __device__ void visit_near(int body, Vec3d place, double reach, Visit&& visit) const {
+    visit_part_of_near(body, place, reach, 0, 1, visit);
+  }
+  /// The same for one of several threads that share the cells.
+  template <class Visit>
+  __device__ void visit_part_of_near(int body, Vec3d place, double reach, int thread, int threads,
+                                     Visit&& visit) const {
     const int rings = rings_within(reach, bodies[body].cell_size);
     const double width = 2.0 * rings + 1;
     if (rings > 3 && width * width * width > points) {  // more cells than points
-      visit_all(body, visit);
+      if (thread == 0) visit_all(body, visit);
       return;
     }
     const CellGrid::Cell c = bodies[body].grid.cell_of(place);
+    int number = 0;
     for (std::int64_t z = c.z - rings; z <= c.z + rings; ++z) {
       for (std::int64_t y = c.y - rings; y <= c.y + rings; ++y) {
         for (std::int64_t x = c.x - rings; x <= c.x + rings; ++x) {
-          visit_cell(body, {x, y, z}, visit);
+          if (number++ % threads == thread) visit_cell(body, {x, y, z}, visit);
         }
       }
     }

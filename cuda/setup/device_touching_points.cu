@@ -246,7 +246,7 @@ std::span<const Box> DeviceTouchingPoints::boxes_of_groups(const DeviceArray<Vec
 }
 
 // The pinned arrays may change: the search has waited since they were sent before.
-void DeviceTouchingPoints::send_reach() {
+void DeviceTouchingPoints::send_reach(const std::vector<double>& skins) {
   const BodyContact& contact = layer_.model().body_contact;
   const auto send = [](auto& pinned, const auto& values, auto& array) {
     pinned.resize(values.size());
@@ -264,9 +264,10 @@ void DeviceTouchingPoints::send_reach() {
   send(sent_start_, partners.offsets, partner_start_);
   send(sent_partner_, partners.indices, partner_);
   send(sent_law_, laws, partner_law_);
+  send(sent_skin_, skins, skin_);
 }
 
-LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double skin) const {
+LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double most_skin) const {
   const Share* const share = layer_.model().share.get();
   return {position.data(),
           site_.data(),
@@ -277,11 +278,13 @@ LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double 
           partner_start_.data(),
           partner_.data(),
           partner_law_.data(),
-          skin,
+          skin_.data(),
+          most_skin,
           share ? share->communicator->rank() : 0};
 }
 
-void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt, double skin) {
+void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt,
+                                const std::vector<double>& skins) {
   const Phase phase("points that may touch");
   const PooledMemory pooled(*pool_);
   pool_->begin_round();
@@ -289,10 +292,10 @@ void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt, d
     gain_ = sent(layer_.gains(dt), name);
     dt_ = dt;
   }
-  reach_ = layer_.reach_of(boxes_of_groups(position), skin, near_bodies_);
-  send_reach();
+  reach_ = layer_.reach_of(boxes_of_groups(position), skins, near_bodies_);
+  send_reach(skins);
   const Model& model = layer_.model();
-  const LayerView layer = view(position, skin);
+  const LayerView layer = view(position, *std::ranges::max_element(skins));
   Phase part("points near other bodies");
   facts_.clear();
   Candidates points = candidates_of(layer, position.size(), facts_);

@@ -52,8 +52,8 @@ class DeviceTouchingPoints {
 
   /// Finds the points anew from places [m], shape [layer], which work on the stream has written.
   /// Launches on the stream may use them at once. Of a share: collective.
-  /// @param dt size of the step [s]. @param skin by which lists reach beyond ranges [m]
-  void find(const DeviceArray<Vec3d>& position, double dt, double skin);
+  /// @param dt size of the step [s]. @param skins of the bodies [m] (`skin_of`)
+  void find(const DeviceArray<Vec3d>& position, double dt, const std::vector<double>& skins);
 
   /// The memory of the points, also for arrays of their values. It must outlive these.
   MemoryPool& pool() const { return *pool_; }
@@ -82,8 +82,8 @@ class DeviceTouchingPoints {
 
  private:
   std::span<const Box> boxes_of_groups(const DeviceArray<Vec3d>& position);
-  void send_reach();
-  LayerView view(const DeviceArray<Vec3d>& position, double skin) const;
+  void send_reach(const std::vector<double>& skins);
+  LayerView view(const DeviceArray<Vec3d>& position, double most_skin) const;
   /// Sets points and lists. @param chosen flags of the candidates that are points
   void set_points(const DeviceArray<ContactCandidate>& points, const DeviceArray<char>& chosen,
                   FoundRows found, int rank);
@@ -113,12 +113,14 @@ class DeviceTouchingPoints {
   DeviceArray<Offset> partner_start_;
   DeviceArray<Index> partner_;
   DeviceArray<ContactLaw> partner_law_;
+  DeviceArray<double> skin_;
   // On the way between the host and the device.
   FactsOnDevice facts_;
   PinnedArray<Box> group_boxes_, sent_box_;
   PinnedArray<Offset> sent_start_;
   PinnedArray<Index> sent_partner_;
   PinnedArray<ContactLaw> sent_law_;
+  PinnedArray<double> sent_skin_;
 };
 
 }  // namespace phyxel::cuda

@@ -145,6 +145,10 @@ static __global__ void find_touches(ContactPasses passes, int rows) {
   const ThreadGroup threads;
   if (threads.number() < rows) passes.find_touch(threads, threads.number());
 }
+static __global__ void find_carriers(ContactPasses passes, int points) {
+  const ThreadGroup threads;
+  if (threads.number() < points) passes.find_carriers(threads, threads.number());
+}
 static __global__ void find_shares(ContactPasses passes, int points) {
   const ThreadGroup threads;
   if (threads.number() < points) passes.find_share(threads, threads.number());

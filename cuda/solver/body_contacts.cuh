@@ -31,9 +31,7 @@ class DeviceBodyContacts {
         layer_(model.model()),
         points_(layer_, places_of(model.model().body_contact.layer.phyxels), model.tiling().tiles(),
                 model.stream()),
-        // Longer lists cost more than rarer searches save: a bin of 1,000 dinos took 2.3 times as
-        // long with the widest skin.
-        watch_(layer_, 1, layer_.least_skin(), 4),
+        watch_(layer_, 1, 4),
         pushes_(has_body_penalties(model.model())),
         rubs_(pushes_ && has_body_friction(model.model().body_contact)) {
     if (!acts()) return;
@@ -69,18 +67,28 @@ class DeviceBodyContacts {
   /// True if bodies touch each other.
   bool acts() const { return m_.model().body_contact.acts(); }
 
+  /// Notes that phyxels have been moved other than by steps.
+  void forget_ways() {
+    knows_ways_ = false;
+    watch_.look_next();
+  }
   /// Begins a step of `dt` [s]: finds how far phyxels have moved, if it is time to look where
-  /// bodies are. The host looks in `begin_step`, while launches in between run; these must not move
-  /// phyxels.
+  /// bodies are and the step before has not found it. The host looks in `begin_step`, while
+  /// launches in between run; these must not move phyxels.
   void begin_look(double dt) {
     is_looking_ = acts() && watch_.is_due(dt);
-    if (is_looking_) find_ways_now();
+    if (is_looking_ && !knows_ways_) find_ways_now();
   }
   /// Prepares for the step of `begin_look`. Of a share: collective.
   void begin_step(double dt, const Passes<Real, StateReal>& passes) {
     if (!acts()) return;
     if (is_looking_) look(dt);
     is_looking_ = false;
+    // The next look is then at what the device has found during this step.
+    if (watch_.is_due_next() && !knows_ways_) {
+      find_ways_now();
+      knows_ways_ = true;
+    }
     dt_ = dt;
     if (!points_.any()) return;
     sums_.prepare(own().place.size(), 1, [&] { m_.wait(); });
@@ -96,6 +104,7 @@ class DeviceBodyContacts {
     end_motion();
     if (m_.share()) refresh(motion_);
     find_touches(passes);
+    find_carriers(passes);
     launch_groups("find_row_pushes", find_row_pushes, rows(), passes, rows());
     launch_groups("push_apart", cuda::push_apart<Real, StateReal>, count(), m_.fields(), passes,
                   places(), regain_.data());
@@ -161,9 +170,10 @@ class DeviceBodyContacts {
                         layer_found_.bytes() + group_begin_.bytes() + group_end_.bytes() +
                         ways_.bytes() + sums_.bytes() + points_.bytes() + motion_.bytes() +
                         velocity_.bytes() + response_.bytes() + carries_.bytes() +
-                        in_patch_.bytes() + touch_.bytes() + force_.bytes() + share_.bytes() +
-                        forces_.bytes() + gradients_.bytes() + regain_.bytes() + modulus_.bytes() +
-                        wakes_.bytes() + is_inside_.bytes() + is_active_.bytes() + way_.bytes();
+                        carriers_.bytes() + carrier_count_.bytes() + in_patch_.bytes() +
+                        touch_.bytes() + force_.bytes() + share_.bytes() + forces_.bytes() +
+                        gradients_.bytes() + regain_.bytes() + modulus_.bytes() + wakes_.bytes() +
+                        is_inside_.bytes() + is_active_.bytes() + way_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -192,6 +202,9 @@ class DeviceBodyContacts {
     if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, rows());
     launch_groups("find_touches", cuda::find_touches, rows(), passes, rows());
   }
+  void find_carriers(const ContactPasses& passes) const {
+    launch_groups("find_carriers", cuda::find_carriers, points(), passes, points());
+  }
   /// Moves phyxels out of the bodies that the step has led them into.
   void move_apart() {
     const ContactPasses passes = this->passes();
@@ -200,6 +213,7 @@ class DeviceBodyContacts {
       refresh(velocity_);
     }
     find_touches(passes);
+    find_carriers(passes);
     launch_groups("find_shares", find_shares, points(), passes, points());
     launch_groups("find_responses", find_responses, rows(), passes, rows());
     for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
@@ -226,9 +240,11 @@ class DeviceBodyContacts {
   /// Finds the points that may touch anew if phyxels have moved far enough.
   void look(double dt) {
     const Phase phase("looking where bodies are");
-    if (!watch_.is_late_by(ways_now(), dt)) return;
+    const bool is_late = watch_.is_late_by(ways_now(), dt, knows_ways_ ? 1 : 0);
+    knows_ways_ = false;
+    if (!is_late) return;
     find_places();
-    points_.find(layer_found_, dt, watch_.skin());
+    points_.find(layer_found_, dt, watch_.skins());
     watch_.found(points_.reach());
     make_arrays(dt);
   }
@@ -294,6 +310,8 @@ class DeviceBodyContacts {
     make_cleared(wakes_, rows);
     make_cleared(way_, 1);
     make_cleared(carries_, lists().near.size());
+    make(carriers_, lists().near.size());
+    make(carrier_count_, contact_threads * points);
     make(response_, rows);
     make(force_, rows);
     in_patch_ = {};
@@ -353,6 +371,8 @@ class DeviceBodyContacts {
             .response = response_.data(),
             .force = force_.data(),
             .carries = carries_.data(),
+            .carriers = carriers_.data(),
+            .carrier_count = carrier_count_.data(),
             .in_patch = in_patch_.data(),
             .share = share_.data(),
             // What points of other devices do is not among the ways here.
@@ -380,6 +400,7 @@ class DeviceBodyContacts {
   PinnedArray<double> found_ways_;              // the same on the host
   Event ways_are_there_;                        // recorded after their copy
   bool is_looking_ = false;                     // from `begin_look` to `begin_step`
+  bool knows_ways_ = false;                     // true if the step before has found them
   DeviceArray<Real> gradients_;                 // of this device's points
   DeviceArray<PointForces> forces_;             // on them
   DeviceArray<double> regain_, modulus_;        // of penalties; empty without them
@@ -387,6 +408,8 @@ class DeviceBodyContacts {
   DeviceArray<SurfaceMotion> motion_;
   DeviceArray<Vec3<double>> velocity_;
   DeviceArray<SurfaceShare> carries_;
+  DeviceArray<SurfaceCarrier> carriers_;
+  DeviceArray<Index> carrier_count_;
   DeviceArray<char> in_patch_;
   DeviceArray<SurfaceTouch> touch_;
   DeviceArray<SurfaceResponse> response_;

@@ -79,12 +79,16 @@ __device__ bool keep_phyxel_out(const Fields<Real, StateReal>& f,
   }
   const Vec3<StateReal> velocity = column3(f.velocity, f.places, at);
   const Vec3<double> u = to<double>(displacement), v = to<double>(velocity);
+  const Vec3<double> position = layer.position[k] + u;
+  // Most phyxels are outside, and need no more than that.
+  if (!(gap_to(shape, obstacle, position).distance < layer.offset[k])) {
+    if (is_last) layer.before[k] = velocity;
+    return false;
+  }
   const Vec3<StateReal> before = layer.before[k];
   if (is_last) layer.before[k] = velocity;
-  const auto free = [&](int axis) { return layer.prescribed[k] >> axis & 1 ? 0.0 : 1.0; };
-  TouchingPoint point{layer.position[k] + u, v,
-                      to<double>(before),    {free(0), free(1), free(2)},
-                      layer.offset[k],       layer.inertia[k]};
+  TouchingPoint point{
+      position, v, to<double>(before), free_axes_of(layer, k), layer.offset[k], layer.inertia[k]};
   if (!touch(shape, obstacle, point, terms)) return false;
   displacement = to<StateReal>(u + obstacle.dt * (point.velocity - v));
   const Vec3<StateReal> changed = to<StateReal>(point.velocity);

@@ -326,6 +326,7 @@ class CudaBackend final : public Backend {
     m_.wait();
     if (m_.share()) m_.share()->communicator->largest(0);  // a barrier of the ranks
     fresh_ = true;
+    body_contacts_.forget_ways();
   }
   /// Launches the next steps that can be launched together, at most `left`, from a time [s].
   /// @param surfels surfels to move after each step, or null

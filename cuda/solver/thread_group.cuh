@@ -25,6 +25,7 @@ class ThreadGroup {
   __device__ void each(const Offset* start, Each&& each) const {
     for (Offset k = start[thread_]; k < start[thread_ + 1]; ++k) each(k);
   }
+  __device__ int part() const { return thread_; }
   __device__ double sum(double part) const {
     for (int way = size / 2; way > 0; way /= 2) part += __shfl_xor_sync(mask_, part, way);
     return part;

@@ -10,20 +10,12 @@
 #include "solver/contact_stiffness.hpp"
 
 namespace phyxel {
-namespace {
-
-/// In 36 dinos that fall onto each other, half of the widest skin was fastest: a quarter took a
-/// tenth more time, all of it a third more.
-double widest_skin(const SurfaceLayer& layer) { return 0.5 * layer.most_skin(); }
-
-}  // namespace
-
 BodyContacts::BodyContacts(const Model& model, int threads)
     : model_(model),
       threads_(threads),
       layer_(model),
       points_(layer_),
-      watch_(layer_, threads, widest_skin(layer_)),
+      watch_(layer_, threads),
       pushes_(has_body_penalties(model)) {
   if (!acts()) return;
   rubs_ = pushes_ && has_body_friction(model.body_contact);
@@ -34,7 +26,7 @@ BodyContacts::BodyContacts(const Model& model, int threads)
 }
 
 void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
-  points_.find(position, dt, watch_.skin());
+  points_.find(position, dt, watch_.skins());
   watch_.found(std::move(position), points_.reach());
   const std::size_t points = points_.sites().size(), rows = points_.rows().size();
   motion_.assign(points, {});
@@ -44,6 +36,8 @@ void BodyContacts::find_points(std::vector<Vec3d> position, double dt) {
   responses_.assign(rows, {});
   row_forces_.assign(rows, {});
   carries_.assign(points_.near().indices.size(), {});
+  carriers_.assign(carries_.size(), {});
+  carrier_counts_.assign(contact_threads * points, 0);
   in_patch_.assign(points_.have_patches() ? carries_.size() : 0, 1);
   shares_.assign(points, 0);
   wakes_.assign(rows, 0);
@@ -84,6 +78,8 @@ ContactPasses BodyContacts::passes() {
           .response = responses_.data(),
           .force = row_forces_.data(),
           .carries = carries_.data(),
+          .carriers = carriers_.data(),
+          .carrier_count = carrier_counts_.data(),
           .in_patch = in_patch_.empty() ? nullptr : in_patch_.data(),
           .share = shares_.data(),
           .wakes = wakes_.data(),
@@ -143,6 +139,9 @@ void BodyContacts::find_active() {
     add(points_.rows()[r].point);
     for (const Index p : points_.near_row(r)) add(p);
   }
+  const ContactPasses passes = this->passes();
+#pragma omp parallel for schedule(static) num_threads(threads_here())
+  for (std::size_t k = 0; k < active_.size(); ++k) passes.find_carriers(OneThread{}, active_[k]);
 }
 
 void BodyContacts::find_responses() {
@@ -216,7 +215,8 @@ std::size_t BodyContacts::bytes() const {
          watch_.bytes() +
          motion_.size() * (sizeof(SurfaceMotion) + 2 * sizeof(Vec3d) + sizeof(double)) +
          touches_.size() * (sizeof(SurfaceTouch) + sizeof(SurfaceResponse) + sizeof(SurfaceForce)) +
-         carries_.size() * sizeof(SurfaceShare) + in_patch_.size() +
+         carries_.size() * sizeof(SurfaceShare) + carriers_.size() * sizeof(SurfaceCarrier) +
+         carrier_counts_.size() * sizeof(Index) + in_patch_.size() +
          wakes_.size() * sizeof(double) + 2 * forces_.size() * sizeof(PointForces) +
          (modulus_.size() + regain_.size()) * sizeof(double);
 }

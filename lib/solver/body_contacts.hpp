@@ -24,11 +24,9 @@ class TouchingPoints {
   explicit TouchingPoints(const SurfaceLayer& layer) : model_(layer.model()), layer_(layer) {}
 
   /// Finds them anew from places. Of a share: collective. @param dt size of the step [s]
-  /// @param skin by which lists reach beyond ranges [m]
-  void find(std::span<const Vec3d> position, double dt, double skin);
+  /// @param skins of the bodies [m] (`skin_of`)
+  void find(std::span<const Vec3d> position, double dt, std::span<const double> skins);
 
-  /// The skin of the lists [m].
-  double skin() const { return skin_; }
   /// The extents of bodies when points were found.
   const BodyReach& reach() const { return reach_; }
 
@@ -74,7 +72,7 @@ class TouchingPoints {
 
   const Model& model_;
   const SurfaceLayer& layer_;
-  double skin_ = 0;  // [m]
+  std::vector<double> skins_;  // of bodies [m]
   NearBoxes near_bodies_;
   BodyReach reach_;
   PointExchange exchange_;
@@ -253,8 +251,8 @@ class BodyContacts {
     }
   }
   void find_touches();
-  /// Finds the rows whose points are inside other bodies, and all points of these rows: no other
-  /// point has a force.
+  /// Finds the rows whose points are inside other bodies, all points of these rows, for no other
+  /// point has a force, and the entries by which forces act on them.
   void find_active();
   void find_responses();
   void find_forces();
@@ -280,6 +278,8 @@ class BodyContacts {
   std::vector<SurfaceTouch> touches_;       // shape [rows]
   std::vector<SurfaceResponse> responses_;  // shape [rows]
   std::vector<SurfaceShare> carries_;       // shape [entries]
+  std::vector<SurfaceCarrier> carriers_;    // shape [entries]
+  std::vector<Index> carrier_counts_;       // shape [contact_threads, points]
   std::vector<char> in_patch_;              // shape [entries]; empty if there are no patches
   std::vector<SurfaceForce> row_forces_;    // shape [rows]
   std::vector<double> shares_;              // c of each point

@@ -39,9 +39,9 @@ void BodyPenalty::find_points(const Vector& u) {
     if (knows_points_) moved = std::max(moved, norm(now[k] - found_at_[k]));
   }
   if (model_.share) moved = model_.share->communicator->largest(moved);
-  if (moved <= 0.5 * points_.skin()) return;
+  if (moved <= 0.5 * layer_.least_skin()) return;
   found_at_ = std::move(now);
-  points_.find(found_at_, 1, layer_.least_skin());
+  points_.find(found_at_, 1, layer_.skins(layer_.least_skin()));
   modulus_ = points_.wave_moduli();
   knows_points_ = true;
   knows_shapes_ = knows_expected_ = false;

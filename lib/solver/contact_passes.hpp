@@ -24,6 +24,11 @@ struct PointForces {
   PHYXEL_HD Vec3<double> sum() const { return normal + tangential; }
 };
 
+/// An entry that carries a force in this step.
+struct SurfaceCarrier {
+  Index entry = 0, row = 0;
+};
+
 /// How far points have moved since lists were found.
 struct PointWay {
   double before = 0;   ///< The sum over earlier steps of the largest way of a point [m].
@@ -39,9 +44,10 @@ PHYXEL_HD Vec3<double> along_free_axes(const SurfaceSite& site, Vec3<double> v) 
 }
 
 /// The arrays of the passes. Whoever fills them runs `find_patch` and `find_touch` for all rows,
-/// `find_share` for all points on which forces may act, and `find_response` for all rows; then, in
-/// each sweep, `find_force` for all rows and `forces_on` for its own points, whose velocities it
-/// changes. Each is run by one thread (`OneThread`) or by a group that shares the work.
+/// `find_carriers` and `find_share` for all points on which forces may act, and `find_response` for
+/// all rows; then, in each sweep, `find_force` for all rows and `forces_on` for its own points,
+/// whose velocities it changes. Each is run by one thread (`OneThread`) or by a group that shares
+/// the work.
 struct ContactPasses {
   const SurfaceSite* site = nullptr;  ///< Shape [points], as all others of points.
   const SurfaceMotion* motion = nullptr;
@@ -63,6 +69,9 @@ struct ContactPasses {
   SurfaceResponse* response = nullptr;     ///< Of each row.
   SurfaceForce* force = nullptr;           ///< Of each row.
   SurfaceShare* carries = nullptr;         ///< Of each entry.
+  /// In front of each part of a point's `entries_of`: those that carry a force. How many these are.
+  SurfaceCarrier* carriers = nullptr;
+  Index* carrier_count = nullptr;  ///< Shape [contact_threads, points].
   /// Of each entry: true if it is of its row's patch; null if no point is beside several.
   char* in_patch = nullptr;
   double* share = nullptr;  ///< c of each point [m²].
@@ -116,13 +125,23 @@ struct ContactPasses {
     if (is_active && found.is_inside) is_active[here.point] = 1;
     if (wakes) wakes[r] = wakes_at;
   }
+  /// Finds the entries by which other bodies act on a point.
+  template <class Threads>
+  PHYXEL_HD void find_carriers(const Threads& threads, Index p) const {
+    if (is_active && !is_active[p]) return;
+    SurfaceCarrier* const first = carriers + entries_of_point(p)[threads.part()];
+    Index count = 0;
+    threads.each(entries_of_point(p), [&](Offset k) {
+      const Index e = entries_of[k], r = rows_naming[k];
+      if (is_inside[r] && carries[e].weight > 0) first[count++] = {e, r};
+    });
+    carrier_count[contact_threads * static_cast<Offset>(p) + threads.part()] = count;
+  }
   template <class Threads>
   PHYXEL_HD void find_share(const Threads& threads, Index p) const {
     if (is_active && !is_active[p]) return;
     double area = 0;
-    threads.each(entries_of_start + contact_threads * static_cast<Offset>(p), [&](Offset k) {
-      if (is_inside[rows_naming[k]]) area += carries[entries_of[k]].area;
-    });
+    each_carrier(threads, p, [&](Index e, Index) { area += carries[e].area; });
     area = threads.sum(area);
     if (!threads.is_first()) return;
     for (Offset k = rows_from_start[p]; k < rows_from_start[p + 1]; ++k) {
@@ -169,9 +188,7 @@ struct ContactPasses {
   template <class Threads>
   PHYXEL_HD PointForces forces_on(const Threads& threads, Index p) const {
     PointForces sum;
-    threads.each(entries_of_start + contact_threads * static_cast<Offset>(p), [&](Offset k) {
-      const Index e = entries_of[k], r = rows_naming[k];
-      if (!is_inside[r] || !(carries[e].weight > 0)) return;
+    each_carrier(threads, p, [&](Index e, Index r) {
       sum.normal += force[r].normal_reaction(touch[r], carries[e]);
       sum.tangential += force[r].tangential_reaction(touch[r], carries[e], motion[p].before);
     });
@@ -210,6 +227,16 @@ struct ContactPasses {
   }
   PHYXEL_HD const Offset* entries_of_row(Index r) const {
     return near_start + contact_threads * static_cast<Offset>(r);
+  }
+  PHYXEL_HD const Offset* entries_of_point(Index p) const {
+    return entries_of_start + contact_threads * static_cast<Offset>(p);
+  }
+  /// Calls visit(entry, row) for what `find_carriers` has found of a point.
+  template <class Threads, class Visit>
+  PHYXEL_HD void each_carrier(const Threads& threads, Index p, Visit&& visit) const {
+    const SurfaceCarrier* const first = carriers + entries_of_point(p)[threads.part()];
+    const Index count = carrier_count[contact_threads * static_cast<Offset>(p) + threads.part()];
+    for (Index k = 0; k < count; ++k) visit(first[k].entry, first[k].row);
   }
   /// The velocity of a row's point relative to those that carry it.
   template <class Threads>

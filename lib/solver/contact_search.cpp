@@ -15,21 +15,23 @@ namespace {
 /// The phyxels near a point, of bodies that it may touch.
 class Neighbours {
  public:
-  Neighbours(const BodyContact& contact, std::span<const ContactCandidate> points, double skin)
+  Neighbours(const BodyContact& contact, std::span<const ContactCandidate> points,
+             std::span<const double> skins)
       : contact_(contact),
         points_(points),
-        skin_(skin),
+        skins_(skins),
+        range_(largest_range(points)),
         position_(tabulated(points.size(), [&](std::size_t k) { return points[k].now; })),
-        hash_(position_, reach(points, skin)),
-        reach_(reach(points, skin)) {}
+        hash_(position_, range_ + *std::ranges::min_element(skins)) {}
 
   /// The numbers of the phyxels near a point, by bodies, then by their part of a list, ascending.
   std::vector<Index> of(std::size_t p) const {
     const ContactCandidate& point = points_[p];
     std::vector<Index> found;
-    hash_.visit_ball(point.now, reach_, [&](const SpatialHash::Entry& entry) {
+    const double reach = range_ + skins_[static_cast<std::size_t>(point.body)];
+    hash_.visit_ball(point.now, reach, [&](const SpatialHash::Entry& entry) {
       const ContactCandidate& other = points_[static_cast<std::size_t>(entry.index)];
-      if (!is_near(point, other, skin_)) return;
+      if (!is_near(point, other, skins_.data())) return;
       if (contact_.law_of(point.body, other.body)) found.push_back(entry.index);
     });
     std::sort(found.begin(), found.end(), [&](Index a, Index b) {
@@ -40,18 +42,18 @@ class Neighbours {
   }
 
  private:
-  static double reach(std::span<const ContactCandidate> points, double skin) {
+  static double largest_range(std::span<const ContactCandidate> points) {
     double range = 0;
     for (const ContactCandidate& point : points) range = std::max(range, point.site.range);
-    return range + skin;
+    return range;
   }
 
   const BodyContact& contact_;
   std::span<const ContactCandidate> points_;
-  double skin_;
+  std::span<const double> skins_;
+  double range_;  ///< The largest one [m].
   std::vector<Vec3d> position_;
   SpatialHash hash_;
-  double reach_;
 };
 
 /// The phyxels of one body near a point, as lists have them.
@@ -110,11 +112,11 @@ std::vector<ContactCandidate> of_all_ranks(const Model& model, std::vector<Conta
 }
 
 ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandidate> points,
-                      double skin) {
+                      std::span<const double> skins) {
   ContactRows found;
   std::vector<std::pair<Index, Index>> entries;
   if (points.empty()) return found;
-  const Neighbours neighbours(contact, points, skin);
+  const Neighbours neighbours(contact, points, skins);
   const std::vector<std::vector<Index>> near =
       tabulated(points.size(), [&](std::size_t p) { return neighbours.of(p); });
   const std::vector<std::vector<Beside>> beside =

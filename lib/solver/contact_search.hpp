@@ -49,8 +49,19 @@ inline constexpr double ranges_apart = 2;
 /// The part of a list that a phyxel is in.
 PHYXEL_HD int part_of_list(const ContactCandidate& point) { return point.id % contact_threads; }
 
+/// The skin of two bodies [m], by which lists of the points of one near the other reach beyond
+/// ranges: the smaller one of theirs. A body's skin lasts for the fastest of those that it may soon
+/// meet, which has one as wide; bodies that are slow against each other have short lists. Equal on
+/// all ranks.
+/// @param skins of all bodies [m]
+PHYXEL_HD double skin_of(const double* skins, Index a, Index b) {
+  return skins[a] < skins[b] ? skins[a] : skins[b];
+}
+
 /// True if a phyxel of a surface comes into the list of a point, if their bodies touch.
-PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& other, double skin) {
+/// @param skins of the bodies [m]
+PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& other,
+                       const double* skins) {
   // Points far apart would press on a fine surface like nails; it has points of its own. Edges
   // and corners act all the same, for they come between the points of a fine surface.
   constexpr double coarser = 1.5;
@@ -59,6 +70,7 @@ PHYXEL_HD bool is_near(const ContactCandidate& point, const ContactCandidate& ot
   const auto is_within = [](Vec3d way, double distance) {
     return dot(way, way) <= distance * distance;
   };
+  const double skin = skin_of(skins, point.body, other.body);
   if (!is_within(other.now - point.now, range + skin)) return false;
   return point.body != other.body ||
          !is_within(other.site.rest - point.site.rest, ranges_apart * range);
@@ -72,7 +84,7 @@ PHYXEL_HD ContactRow row_of(const ContactCandidate& point, Index number, Index b
 }
 
 /// True if a phyxel of a surface may be near a body whose phyxels are in a box.
-/// @param box grown by the ranges of its phyxels
+/// @param box grown by the ranges of its phyxels. @param skin of both bodies [m]
 PHYXEL_HD bool may_be_near(Vec3d now, double range, double skin, const Box& box) {
   return overlap(grown({now, now}, range + 0.5 * skin), grown(box, 0.5 * skin));
 }
@@ -81,9 +93,9 @@ PHYXEL_HD bool may_be_near(Vec3d now, double range, double skin, const Box& box)
 /// of this rank
 std::vector<ContactCandidate> of_all_ranks(const Model& model, std::vector<ContactCandidate> some);
 
-/// Finds the rows of points with phyxels of other bodies' surfaces within the common range and a
-/// skin. @param points ascending by their ids
+/// Finds the rows of points with phyxels of other bodies' surfaces within the common range and the
+/// skin of both bodies. @param points ascending by their ids. @param skins of the bodies [m]
 ContactRows find_rows(const BodyContact& contact, std::span<const ContactCandidate> points,
-                      double skin);
+                      std::span<const double> skins);
 
 }  // namespace phyxel

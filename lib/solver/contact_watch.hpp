@@ -28,6 +28,8 @@ class ContactWatch {
   explicit ContactWatch(int rarest) : rarest_(rarest) {}
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
+  /// True if it will be time before the next step.
+  bool is_due_next() const { return left_ <= 1; }
   /// True if points have been found for steps of `dt` [s].
   bool has_found(double dt) const { return generation_ > 0 && dt == dt_; }
   /// Notes that points are found anew for steps of `dt` [s].
@@ -39,6 +41,8 @@ class ContactWatch {
   void put_off(double steps = HUGE_VAL) {
     left_ = static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(rarest_)));
   }
+  /// Asks for a look before the next step.
+  void look_next() { left_ = 1; }
   /// Most steps between two looks.
   int rarest() const { return rarest_; }
   /// How often points had to be found.
@@ -63,17 +67,21 @@ struct SurfaceWay {
 class LayerWatch {
  public:
   /// @param layer must outlive this. @param threads most threads that share the work
-  /// @param widest skin that is worth its time in each step [m], where one step does not need more
   /// @param rarest most steps between two looks (`ContactWatch`)
-  LayerWatch(const SurfaceLayer& layer, int threads, double widest, int rarest = 1);
+  LayerWatch(const SurfaceLayer& layer, int threads, int rarest = 1);
 
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return watch_.is_due(dt); }
+  /// True if it will be time before the next step.
+  bool is_due_next() const { return watch_.is_due_next(); }
+  /// Asks for a look before the next step, since phyxels have been moved other than by steps.
+  void look_next() { watch_.look_next(); }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param ways of the groups since points were found, zero before that
-  bool is_late_by(std::vector<SurfaceWay> ways, double dt) {
+  /// @param since steps since the time of these ways
+  bool is_late_by(std::vector<SurfaceWay> ways, double dt, int since = 0) {
     ways_ = std::move(ways);
-    return layer_.model().share ? is_late_on_ranks(dt) : is_late_here(dt);
+    return layer_.model().share ? is_late_on_ranks(dt, since) : is_late_here(dt, since);
   }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param state_of returns the state of a phyxel
@@ -94,10 +102,10 @@ class LayerWatch {
     }
     return is_late_by(std::move(ways_), dt);
   }
-  /// The skin of the lists that are to be found [m], once `is_late` has asked for them: it lasts
-  /// for some tens of steps, within the bounds of the layer, and for one at least. Fast bodies need
-  /// a wide one; a wide one costs time in each step.
-  double skin() const { return skin_; }
+  /// The skins of bodies for the lists that are to be found [m], once `is_late` has asked for them:
+  /// they last for some steps, within the bounds of the layer, and for one at least. Fast bodies
+  /// need wide ones; wide ones cost time in each step.
+  const std::vector<double>& skins() const { return skins_; }
   /// Notes where bodies are when points are found.
   void found(const BodyReach& reach) { reach_ = reach; }
   /// Notes their phyxels' places, too, which `is_late` with states looks at [m], shape [layer].
@@ -110,30 +118,33 @@ class LayerWatch {
   std::size_t bytes() const { return found_at_.size() * sizeof(Vec3d); }
 
  private:
-  bool is_late_on_ranks(double dt);
-  bool is_late_here(double dt);
-  /// The motions of bodies up to the next look, in which their speeds may grow.
+  bool is_late_on_ranks(double dt, int since);
+  bool is_late_here(double dt, int since);
+  /// The motions of bodies.
   struct BodyMotions {
     std::vector<Box> speeds;  ///< Boxes of the velocities now [m/s], shape [bodies].
     std::vector<Box> ways;    ///< Boxes of the ways since points were found [m], shape [bodies].
-    std::vector<Box> boxes;   ///< Boxes of the bodies [m]; empty before points are found.
+    std::vector<Box> boxes;   ///< Boxes of the bodies now [m]; empty before points are found.
   };
-  BodyMotions body_motions(double dt) const;
+  BodyMotions body_motions() const;
+  /// The boxes of bodies now and over some steps, in which speeds may grow [m].
+  std::vector<Box> boxes_after(const BodyMotions& bodies, int steps, double dt) const;
   /// Calls visit(a, b) for bodies whose boxes overlap; with a = b if bodies may touch themselves.
   template <class Visit>
   void for_each_meeting(std::span<const Box> boxes, Visit&& visit);
-  /// True if bodies may touch in the next step at places that are not among the points.
-  bool have_come_near(const BodyMotions& bodies);
-  /// The largest relative speed of bodies that may soon be near each other [m/s]; of all bodies
-  /// before points are found.
-  double fastest_meeting(const BodyMotions& bodies);
-  /// Sets the skin for bodies that move against each other at a speed [m/s].
-  void set_skin(double speed, double dt);
+  /// The number of steps in which bodies can't touch at places that are not among the points, as
+  /// far as the next look.
+  double steps_left(const BodyMotions& bodies, double dt);
+  /// Sets the skins of bodies by the relative speeds of those that may soon be near each other; of
+  /// all bodies before points are found. @returns the number of steps that they last for
+  double set_skins(const BodyMotions& bodies, double dt);
+  /// The skin for bodies that move against each other at a speed [m/s].
+  double skin_for(double speed, double dt) const;
 
   const SurfaceLayer& layer_;
   int threads_;
   ContactWatch watch_;
-  double widest_, skin_;          // [m]
+  std::vector<double> skins_;     // of bodies [m]
   std::vector<Vec3d> found_at_;   // [m], shape [layer]
   std::vector<SurfaceWay> ways_;  // of each group
   NearBoxes near_;                // of bodies

@@ -128,14 +128,15 @@ Box SurfaceLayer::box_of(const LayerGroup& group, std::span<const Vec3d> positio
   return box;
 }
 
-BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position, double skin,
+BodyReach SurfaceLayer::reach_at(std::span<const Vec3d> position, std::span<const double> skins,
                                  NearBoxes& near) const {
   return reach_of(
-      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }), skin,
+      tabulated(groups_.size(), [&](std::size_t g) { return box_of(groups_[g], position); }), skins,
       near);
 }
 
-BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, double skin, NearBoxes& near) const {
+BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, std::span<const double> skins,
+                                 NearBoxes& near) const {
   const Phase phase("bodies near each other");
   BodyReach reach{.boxes = std::vector(model_.body_contact.distances.size(), no_box),
                   .partners = {}};
@@ -155,7 +156,9 @@ BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, double skin, NearBo
   }
   std::vector<Box> with_skin;
   with_skin.reserve(reach.boxes.size());
-  for (const Box& box : reach.boxes) with_skin.push_back(grown(box, 0.5 * skin));
+  for (std::size_t b = 0; b < skins.size(); ++b) {
+    with_skin.push_back(grown(reach.boxes[b], 0.5 * skins[b]));
+  }
   reach.partners = partners_of_bodies(model_.body_contact, with_skin, near);
   return reach;
 }

@@ -35,7 +35,8 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
     SurfaceSite site = layer_.sites()[k];
     const std::span<const Index> others = reach_.partners.row(body);
     if (std::none_of(others.begin(), others.end(), [&](Index b) {
-          return may_be_near(position[k], site.range, skin_, reach_.boxes[b]);
+          return may_be_near(position[k], site.range, skin_of(skins_.data(), body, b),
+                             reach_.boxes[b]);
         })) {
       continue;
     }
@@ -46,12 +47,13 @@ std::vector<ContactCandidate> TouchingPoints::candidates(std::span<const Vec3d> 
   return of_all_ranks(model_, std::move(some));
 }
 
-void TouchingPoints::find(std::span<const Vec3d> position, double dt, double skin) {
+void TouchingPoints::find(std::span<const Vec3d> position, double dt,
+                          std::span<const double> skins) {
   const Phase phase("points that may touch");
-  skin_ = skin;
-  reach_ = layer_.reach_at(position, skin, near_bodies_);
+  skins_.assign(skins.begin(), skins.end());
+  reach_ = layer_.reach_at(position, skins, near_bodies_);
   const std::vector<ContactCandidate> all = candidates(position, dt);
-  ContactRows found = find_rows(model_.body_contact, all, skin);
+  ContactRows found = find_rows(model_.body_contact, all, skins);
   any_ = !found.rows.empty();
   keep_what_counts(all, std::move(found));
   invert();

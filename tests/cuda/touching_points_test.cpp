@@ -82,9 +82,11 @@ TEST_P(TouchingPointsOnDevice, AreThoseOfTheHost) {
   int patches = 0;
   for (int search = 0; search < 3; ++search) {
     const double dt = search < 2 ? 1e-4 : 2e-4;
-    const double skin = search == 1 ? layer.most_skin() : layer.least_skin();
-    host.find(position, dt, skin);
-    device.find(sent(position), dt, skin);
+    // In the last search each body has a skin of its own.
+    std::vector<double> skins = layer.skins(search == 1 ? layer.most_skin() : layer.least_skin());
+    for (std::size_t b = 0; search == 2 && b < skins.size(); b += 2) skins[b] = layer.most_skin();
+    host.find(position, dt, skins);
+    device.find(sent(position), dt, skins);
     EXPECT_EQ(device.any(), host.any());
     expect_same(host.own(), device.own().layer, "numbers in the layer");
     expect_same(host.sites(), device.lists().site, "sites");
@@ -183,7 +185,7 @@ TEST(TouchingPointsOfDistantBodies, AreNone) {
   DeviceTouchingPoints device(layer, std::vector<Index>(layer.phyxels().size()), 1, nullptr);
   std::vector<Vec3d> position;
   for (const SurfaceSite& site : layer.sites()) position.push_back(site.rest);
-  device.find(sent(position), 1e-4, layer.most_skin());
+  device.find(sent(position), 1e-4, layer.skins(layer.most_skin()));
   EXPECT_FALSE(device.any());
   EXPECT_EQ(device.own().layer.size(), 0u);
   EXPECT_EQ(device.lists().rows.size(), 0u);

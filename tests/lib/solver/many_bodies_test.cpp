@@ -11,6 +11,7 @@
 #include "model/contact.hpp"
 #include "model/contact_groups.hpp"
 #include "model/parts.hpp"
+#include "solver/contact_search.hpp"
 #include "solver/contact_watch.hpp"
 #include "solver/step_contacts.hpp"
 #include "support/contact_scene.hpp"
@@ -127,7 +128,7 @@ TEST(Copies, ActAsBodiesWithFieldsOfTheirOwn) {
 struct Watched {
   Model model;
   SurfaceLayer layer{model};
-  LayerWatch watch{layer, 1, 0.5 * layer.most_skin()};
+  LayerWatch watch{layer, 1};
   NearBoxes near;
   std::vector<Vec3d> way, velocity;  // of each body
 
@@ -152,7 +153,7 @@ struct Watched {
     for (const Index i : model.body_contact.layer.phyxels) {
       position.push_back(model.position[i] + state_of(i).displacement);
     }
-    watch.found(position, layer.reach_at(position, watch.skin(), near));
+    watch.found(position, layer.reach_at(position, watch.skins(), near));
     return true;
   }
 };
@@ -173,19 +174,19 @@ TEST(LayerWatch, LooksAtBodiesThatMoveAgainstEachOtherAlone) {
   EXPECT_TRUE(bodies.is_late());
   EXPECT_FALSE(bodies.is_late());
   // Two that are near each other move by less than a skin, and by more.
-  bodies.way[0].y = 0.9 * bodies.watch.skin();
+  bodies.way[0].y = 0.9 * bodies.watch.skins()[0];
   EXPECT_FALSE(bodies.is_late());
-  bodies.way[1].z -= 0.9 * bodies.watch.skin();
+  bodies.way[1].z -= 0.9 * bodies.watch.skins()[0];
   EXPECT_TRUE(bodies.is_late());
   // One is so fast that it will.
   EXPECT_FALSE(bodies.is_late());
-  bodies.velocity[0].y = 0.6 * bodies.watch.skin() / dt;
+  bodies.velocity[0].y = 0.6 * bodies.watch.skins()[0] / dt;
   EXPECT_TRUE(bodies.is_late());
 }
 
 TEST(LayerWatch, LooksAsSoonAsBodiesMayHaveGoneFartherThanTheSkin) {
   const Watched bodies({{}, {0.25, 0, 0}});
-  LayerWatch rare(bodies.layer, 1, bodies.layer.least_skin(), 4);
+  LayerWatch rare(bodies.layer, 1, 4);
   NearBoxes near;
   double step = 2 * dt;
   const auto next_look = [&](double speed) {
@@ -195,20 +196,69 @@ TEST(LayerWatch, LooksAsSoonAsBodiesMayHaveGoneFartherThanTheSkin) {
     step *= 0.5;  // a step of another size is looked at anew
     EXPECT_TRUE(rare.is_late(step, state_of));
     const std::vector<Vec3d> position(bodies.layer.sites().size());
-    rare.found(bodies.layer.reach_at(position, rare.skin(), near));
+    rare.found(bodies.layer.reach_at(position, rare.skins(), near));
     int steps = 1;
     while (!rare.is_due(step)) ++steps;
     return steps;
   };
-  // Speeds may double; the widest skin that is worth its time is the narrowest one.
+  // Speeds may double; the widest skin that is worth its time lasts for some steps.
   const auto speed_over = [&](double steps) {
-    return bodies.layer.least_skin() / (2 * steps * 0.5 * step);
+    return bodies.layer.most_skin() / (2 * steps * 0.5 * step);
   };
   EXPECT_EQ(next_look(speed_over(100)), 4);
   EXPECT_EQ(next_look(speed_over(2.5)), 2);
   EXPECT_EQ(next_look(speed_over(1.5)), 1);
   EXPECT_EQ(next_look(speed_over(0.5)), 1);  // with a wider skin
-  EXPECT_GT(rare.skin(), 1.9 * bodies.layer.least_skin());
+  EXPECT_GT(rare.skins()[0], 1.9 * bodies.layer.most_skin());
+}
+
+/// A device looks every few steps, at ways that it may have found a step ago. Lists must hold to
+/// the end of each step, and are found anew no sooner than they have to be.
+TEST(LayerWatch, KeepsListsAsLongAsTheyHold) {
+  for (const int since : {0, 1}) {
+    const Watched bodies({{}, {0.25, 0, 0}});
+    LayerWatch rare(bodies.layer, 1, 4);
+    NearBoxes near;
+    const double most = bodies.layer.most_skin(), step_way = most / 24;
+    int searches = 0;
+    double found_at = 0, way = 0;
+    for (int step = 0; step < 240; ++step, way += step_way) {
+      if (rare.is_due(dt)) {
+        const double seen = searches > 0 ? way - since * step_way - found_at : 0;
+        std::vector<SurfaceWay> ways;
+        for (const Index body : bodies.layer.bodies_of_groups()) {
+          const Vec3d x{body == 0 ? std::max(seen, 0.0) : 0, 0, 0},
+              v{body == 0 ? step_way / dt : 0, 0, 0};
+          ways.push_back({{x, x}, {v, v}});
+        }
+        if (rare.is_late_by(ways, dt, since)) {
+          ++searches;
+          found_at = way;
+          const std::vector<Vec3d> position(bodies.layer.sites().size());
+          rare.found(bodies.layer.reach_at(position, rare.skins(), near));
+        }
+      }
+      EXPECT_LE(way + step_way - found_at, rare.skins()[0] * (1 + 1e-12)) << step;
+    }
+    // Lists hold for 24 steps; speeds may double in the last ones.
+    EXPECT_LE(searches, since == 0 ? 11 : 12);
+    EXPECT_GE(searches, 10);
+  }
+}
+
+/// Two that fly towards each other have wide skins, others that rest side by side narrow ones.
+TEST(LayerWatch, GivesFastBodiesWideSkins) {
+  Watched bodies({{}, {0.25, 0, 0}, {3, 0, 0}, {3.25, 0, 0}});
+  EXPECT_TRUE(bodies.is_late());
+  bodies.velocity[0].x = 0.1 * bodies.layer.least_skin() / dt;
+  bodies.way[0].x = -1.5 * bodies.layer.least_skin();
+  EXPECT_TRUE(bodies.is_late());
+  const std::vector<double>& skins = bodies.watch.skins();
+  EXPECT_GT(skins[0], 1.9 * bodies.layer.least_skin());
+  EXPECT_EQ(skins[0], skins[1]);
+  EXPECT_DOUBLE_EQ(skins[2], bodies.layer.least_skin());
+  EXPECT_DOUBLE_EQ(skins[3], bodies.layer.least_skin());
+  EXPECT_DOUBLE_EQ(skin_of(skins.data(), 1, 2), bodies.layer.least_skin());
 }
 
 TEST(LayerWatch, LooksAnewWhereTheStepChanges) {

@@ -114,6 +114,8 @@ struct OneThread {
   PHYXEL_HD void each(const Offset* start, Each&& each) const {
     for (Offset k = start[0]; k < start[contact_threads]; ++k) each(k);
   }
+  /// The first part of lists that this thread has.
+  PHYXEL_HD int part() const { return 0; }
   /// The sum of what the threads have.
   template <class T>
   PHYXEL_HD T sum(const T& part) const {
@@ -241,7 +243,11 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
     const Vec3<double> apart = motion_of(k).after - point.after;
     return surface_weight(dot(apart, apart), common_range(site.range, site_of(k).range));
   };
-  const auto weight_of = [&](Offset k) { return facing(point, motion_of(k)) * nearness_of(k); };
+  // Most entries are out of range, which their distance alone tells.
+  const auto weight_of = [&](Offset k) {
+    const double nearness = nearness_of(k);
+    return nearness > 0 ? facing(point, motion_of(k)) * nearness : 0.0;
+  };
   Mat3<double> back{};                  // Σ w G
   Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
   double level = 0, weights = 0;        // Σ w φ(X), Σ w
