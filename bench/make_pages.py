@@ -3,14 +3,16 @@
 typed by hand.
 
     bench/make_pages.py                         all pages
-    bench/make_pages.py accuracy                this page alone, of: performance, scaling, accuracy, laws, cpu, readme
+    bench/make_pages.py accuracy                this page alone, of: performance, scaling, accuracy, laws,
+                                                contact, cpu, readme
     bench/make_pages.py --check                 writes nothing; fails if a page is not up to date
 
-performance, scaling, accuracy and laws are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
+performance, scaling, accuracy, laws and contact are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
 README.md. An error leaves all pages as they were. Drawing needs matplotlib 3.6 or later. --check needs Python alone: it
 compares the text, since charts differ from one version of matplotlib to the next.
 
-The tables come from scripts/measure_gpu.sh, measure_accuracy.py and profile_gpu.sh, bench/compare/*.py, and
+The tables come from scripts/measure_gpu.sh, measure_accuracy.py, measure_contact_examples.py and profile_gpu.sh,
+bench/compare/*.py, and
 
     build/cpu/bin/phyxel bench step --csv docs/results/cpu_step.csv --force
     build/cpu/bin/phyxel bench step --terms green --threads 1,4,16 --phyxels 100000,1000000 \\
@@ -32,11 +34,11 @@ import sys
 import tempfile
 
 sys.dont_write_bytecode = True
-from pages import accuracy, charts, cpu, laws, performance, scaling  # noqa: E402
+from pages import accuracy, charts, contact, cpu, laws, performance, scaling  # noqa: E402
 from pages.tables import PageError, markdown_link  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
-PAGES = {"performance": performance, "scaling": scaling, "accuracy": accuracy, "laws": laws, "cpu": cpu}
+PAGES = {"performance": performance, "scaling": scaling, "accuracy": accuracy, "laws": laws, "contact": contact, "cpu": cpu}
 WRONG_INPUT = 2
 
 

@@ -287,8 +287,8 @@ TEST_F(ContactsOfRuns, ArmsOfAHorseshoeClapAndKeepBothMomenta) {
     nearest = std::min(nearest, between(k));
   }
   const double thickness = 0.028, spacing = std::cbrt(2.2526e-4 / 1200);
-  // They meet at 9 m/s, more than a quarter of the speed of sound in rubber that soft, and flatten
-  // by a quarter.
+  // They meet at 8 m/s, a quarter of the speed of sound in rubber that soft, and flatten by a
+  // quarter.
   EXPECT_GT(nearest, 0.7 * thickness);
   EXPECT_LT(nearest, 0.9 * thickness);
   ASSERT_TRUE(summary.contains("contacts"));
@@ -334,7 +334,7 @@ TEST_F(ContactsOfRuns, ABallThatSlidesBeginsToRollAtFiveSeventhsOfItsSpeed) {
   const std::vector<double> v = probed("skittles", "ball", "velocity_x");
   const double speed = 5, rolling = speed * 5 / 7,
                mass = 1400 * 4 * std::numbers::pi / 3 * std::pow(0.108, 3);
-  // It is flattened by up to 3% of its radius, which is the arm of the friction (seen: 1.4%).
+  // It is flattened by up to 3% of its radius, which is the arm of the friction (seen: 2.0%).
   EXPECT_NEAR(v.back(), rolling, 0.02 * rolling);
   EXPECT_NEAR(v[v.size() - 5], v.back(), 2e-3 * rolling) << "slides still";
   // Its volume is that of a polyhedron.

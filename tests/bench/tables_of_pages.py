@@ -47,5 +47,6 @@ def made_of(name):
                   "scaling": ["gpu_ranks_", "cpu_ranks_", "gpu_sizes"],
                   "accuracy": ["accuracy", "hard_cases_", "cpu_terms", "gpu_terms"],
                   "laws": ["laws"],
+                  "contact": ["contact_examples"],
                   "cpu": ["cpu_step", "cpu_neighbours", "lammps_tlsph"]}[name]
     return sorted(f.name for f in RESULTS.glob("*.csv") if f.name.startswith(tuple(beginnings)))

@@ -12,11 +12,11 @@ from conftest import needs_module
 from tables_of_pages import HOSTILE, RESULTS, SOURCE, cell, made_of, made_pages, write_table
 
 import make_pages
-from pages import accuracy, cpu, laws, performance, scaling, scaling_model
+from pages import accuracy, contact, cpu, laws, performance, scaling, scaling_model
 from pages.problems import problems
 from pages.tables import PageError, read_table
 
-MAKERS = {"performance": performance, "scaling": scaling, "accuracy": accuracy, "laws": laws, "cpu": cpu}
+MAKERS = {"performance": performance, "scaling": scaling, "accuracy": accuracy, "laws": laws, "contact": contact, "cpu": cpu}
 
 
 def phyxel(folder, *arguments, program="PHYXEL_PROGRAM"):
@@ -127,6 +127,37 @@ def test_a_page_about_ranks_is_made_of_what_bench_writes(tmp_path):
     assert read_table(tmp_path / "cpu_ranks_1.csv").columns == read_table(RESULTS / "gpu_ranks_2a.csv").columns
 
 
+def test_a_page_of_contact_has_what_its_script_measures(tmp_path):
+    """The bouncing ball, measured now, has the quantities and the values of the table, and they are on the page."""
+    script = SOURCE / "scripts/measure_contact_examples.py"
+    done = subprocess.run([sys.executable, "-B", script, os.environ["PHYXEL_PROGRAM"], "bouncing_ball", "--out", tmp_path / "now.csv"],
+                          capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    now, table = read_table(tmp_path / "now.csv").rows, read_table(RESULTS / "contact_examples.csv")
+    kept = table.where(case="bouncing_ball")
+    assert [row["quantity"] for row in now] == [row["quantity"] for row in kept]
+    for new, old in zip(now, kept):
+        if old["quantity"] == "processor time":
+            continue
+        for column in ("value", "expected"):
+            # Rounding in floats grows in impacts; the change of the total energy has one digit on the page.
+            tolerance = 0.3 if "change" in old["quantity"] else 0.01
+            assert new[column] == old[column] == "" or new.number(column) == pytest.approx(old.number(column), rel=tolerance), old.place
+    text = page_of("contact", RESULTS)
+    period = table.find(case="bouncing_ball", quantity="time between apexes")
+    assert f"| {period.number('value'):.4g} s | {period.number('expected'):.4g} s: √(2 H₁/g) + √(2 H₂/g)" in text
+    # The formula, of what the table has.
+    heights = [table.find(case="bouncing_ball", quantity=f"height after the {n} impact").number("value") for n in ("first", "second")]
+    touching = table.find(case="bouncing_ball", quantity="time of contact").number("expected")
+    assert period.number("expected") == pytest.approx(sum((2 * h / 9.81) ** 0.5 for h in heights) + touching, rel=1e-5)  # six digits
+
+
+def test_a_page_of_contact_names_a_quantity_that_is_missing(tmp_path):
+    folder = copied(tmp_path, "contact", rows=20)
+    with pytest.raises(PageError, match='contact_examples.csv: no quantity .* of case "cradle"; allowed: a table of'):
+        page_of("contact", folder)
+
+
 def test_the_problems_are_those_of_the_program(tmp_path):
     """bench/pages/problems.json is what phyxel_studies writes."""
     assert problems() == json.loads(phyxel(tmp_path, "problems", program="PHYXEL_STUDIES"))
@@ -142,7 +173,7 @@ KEYS = {"case", "lattice", "partitioner", "cut_by", "terms", "shape", "kernel", 
 @pytest.mark.parametrize("name", MAKERS)
 def test_cells_and_facts_of_every_table_are_text(tmp_path, name):
     """All facts and all cells of text end in hostile words, by turns. Pages keep their lines, and tables their columns."""
-    folder = copied(tmp_path, name, rows=40)
+    folder = copied(tmp_path, name, rows=60)
     bare, words, used = page_of(name, folder, ""), itertools.cycle(HOSTILE), 0
     for file in sorted(folder.iterdir()):
         table = read_table(file)
@@ -225,7 +256,7 @@ def test_nothing_is_written_where_a_table_is_wrong(tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments, words", [
     (["--results", "nowhere"], "nowhere: no such folder; allowed: one with tables"),
-    (["speed"], "page speed: unknown; allowed: performance, scaling, accuracy, laws, cpu, readme"),
+    (["speed"], "page speed: unknown; allowed: performance, scaling, accuracy, laws, contact, cpu, readme"),
     (["readme", "--results", "."], "not the project's own tables"),
     (["readme", "--results", ".", "--readme", "none.md"], "none.md: no such file"),
     (["readme", "--results", ".", "--readme", "bare.md"], "bare.md: has no lines \"<!-- speed: made by"),
@@ -257,7 +288,7 @@ def test_all_pages_are_written_and_checked(tmp_path, capsys):
     assert code == 1 and "Pages are not what the tables say" in found
     assert not (folder / "README.md").exists()  # a check writes nothing
     assert subprocess.run([sys.executable, "-B", SOURCE / "bench/make_pages.py", *arguments]).returncode == 0
-    for file in ("docs/performance.md", "docs/scaling.md", "docs/accuracy.md", "docs/results/README.md", "README.md"):
+    for file in ("docs/performance.md", "docs/scaling.md", "docs/accuracy.md", "docs/contact.md", "docs/results/README.md", "README.md"):
         assert (tmp_path / file).read_text() == (SOURCE / file).read_text(), file
     assert {f.name for f in folder.glob("*.svg")} == {f.name for f in RESULTS.glob("*.svg")}
     assert check() == (0, "")

@@ -6,9 +6,11 @@
 #include <nlohmann/json.hpp>
 
 #include "files/atomic_file.hpp"
+#include "files/trajectory_folder.hpp"
 #include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/scene.hpp"
+#include "report/contact_losses.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -16,24 +18,49 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-/// A row of numbers with seven digits; null for NaN and infinity.
-Json few_digits(const std::vector<std::string>& cells) {
-  Json row = Json::array();
-  for (const std::string& cell : cells) {
-    const double value = std::strtod(cell.c_str(), nullptr);
-    if (std::isfinite(value)) {
-      row.push_back(std::strtod(fmt::format("{:.7g}", value).c_str(), nullptr));
-    } else {
-      row.push_back(nullptr);
-    }
-  }
-  return row;
+/// A number with seven digits; null for NaN and infinity.
+Json few_digits(double value) {
+  if (!std::isfinite(value)) return nullptr;
+  return std::strtod(fmt::format("{:.7g}", value).c_str(), nullptr);
 }
+
+/// The losses in contact of an energy log, divided by their causes.
+class LossColumns {
+ public:
+  LossColumns(const CsvTable& log, const fs::path& folder) : log_(log) {
+    if (!log.has("time [s]") || !log.has(total)) return;  // written by an old program
+    const fs::path file = folder / contacts_name;
+    if (fs::exists(file)) losses_ = read_contact_losses(file);
+    present_ = !losses_.empty();
+    for (std::size_t r = 0; r < log.rows.size() && !present_; ++r) present_ = lost(r) != 0;
+  }
+  /// True if bodies of the run touch each other or obstacles.
+  bool present() const { return present_; }
+  static std::vector<std::string> names() {
+    return {"friction_heat [J]", "impact_loss [J]", "other_contact_loss [J]"};
+  }
+  /// The values of a row of the log [J].
+  std::vector<double> values(std::size_t row) const {
+    const auto found = losses_.find(log_.text(row, "time [s]"));
+    const auto [heat, impact] = found == losses_.end() ? ContactLosses{} : found->second;
+    const double other = lost(row) - heat - impact;
+    const double rounding = 1e-12 * (std::abs(heat) + std::abs(impact));
+    return {heat, impact, std::abs(other) > rounding ? other : 0};
+  }
+
+ private:
+  static constexpr const char* total = "contact_loss [J]";
+  double lost(std::size_t row) const { return std::strtod(log_.text(row, total).c_str(), nullptr); }
+
+  const CsvTable& log_;
+  std::unordered_map<std::string, ContactLosses> losses_;
+  bool present_ = false;
+};
 
 }  // namespace
 
 RunFiles::RunFiles(fs::path folder) : folder_(std::move(folder)) {
-  const fs::path file = folder_ / "run.json";
+  const fs::path file = folder_ / summary_name;
   if (!fs::exists(file)) return;
   try {
     summary_ = Json::parse(read_text_file(file, std::size_t{1} << 24));
@@ -69,14 +96,25 @@ Json RunFiles::timing() const {
 
 Json RunFiles::log() const {
   Json log{{"columns", Json::array()}, {"rows", Json::array()}};
-  const fs::path file = folder_ / "energy.csv";
+  const fs::path file = folder_ / log_name;
   if (!fs::exists(file)) return log;
   const CsvTable table = read_csv(file);
   log["columns"] = table.columns;
+  const LossColumns losses(table, folder_);
+  if (losses.present()) {
+    for (const std::string& name : LossColumns::names()) log["columns"].push_back(name);
+  }
   // A chart cannot show more points than its width.
   const std::size_t step = 1 + table.rows.size() / 4000;
   for (std::size_t r = 0; r < table.rows.size(); r += step) {
-    log["rows"].push_back(few_digits(table.rows[r]));
+    Json row = Json::array();
+    for (const std::string& cell : table.rows[r]) {
+      row.push_back(few_digits(std::strtod(cell.c_str(), nullptr)));
+    }
+    if (losses.present()) {
+      for (const double value : losses.values(r)) row.push_back(few_digits(value));
+    }
+    log["rows"].push_back(std::move(row));
   }
   return log;
 }

@@ -1,4 +1,4 @@
-/// The files beside a trajectory that describe its run: run.json and energy.csv.
+/// The files beside a trajectory that describe its run: run.json, energy.csv and contacts.csv.
 #pragma once
 
 #include <filesystem>
@@ -24,7 +24,9 @@ class RunFiles {
   std::vector<std::string> warnings() const;
   /// Pairs of stage and time [s].
   nlohmann::ordered_json timing() const;
-  /// Columns and rows of the energy log, with at most 4000 rows; empty without one.
+  /// Columns and rows of the energy log, with at most 4000 rows; empty without one. Of a run with
+  /// contact, three columns more divide contact_loss: friction_heat and impact_loss, which are sums
+  /// over the log of contacts, and other_contact_loss, the rest.
   nlohmann::ordered_json log() const;
 
  private:

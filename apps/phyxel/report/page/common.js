@@ -1,7 +1,7 @@
 'use strict';
 // The data, elements, numbers and plots of the page.
 const data = JSON.parse(document.getElementById('data').textContent);
-const colours = ['#1f6fb2', '#d1495b', '#2f9e6e', '#e09f1f', '#7b5cc4', '#11a0b5', '#8a6b4d', '#c4559f', '#6b7a8f', '#9aa812'];
+const colours = ['#1f6fb2', '#d1495b', '#2f9e6e', '#e09f1f', '#7b5cc4', '#11a0b5', '#8a6b4d', '#c4559f', '#6b7a8f', '#9aa812', '#3f4fa8', '#e07a5f', '#4d5b2b'];
 
 function element(name, attributes = {}, ...children) {
   const svg = ['svg', 'path', 'line', 'text'].includes(name);
