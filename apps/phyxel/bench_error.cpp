@@ -200,13 +200,14 @@ void bench_error(const ErrorOptions& options) {
   if (options.from.empty()) {
     const ChosenDevice device = choose_device(options.device);
     all = measured(options, device);
-    if (options.table.json && options.fastest.empty()) return;  // one object on stdout
     facts = device_facts(device);
   } else {
     all = read_csv(options.from);
     facts.emplace_back("from", all.fact("program") + " on " + all.fact("hardware"));
   }
-  const TableOptions summary{options.fastest, options.table.force, false};
+  // JSON is one object: the measured table, or the fastest settings where none is measured.
+  const bool json = options.table.json, is_measured = options.from.empty();
+  const TableOptions summary{options.fastest, options.table.force, json, json && is_measured};
   PrintedTable table(summary, fastest_columns(), facts);
   for (const auto& row : fastest_settings(all, options.levels)) table.row(row);
 }

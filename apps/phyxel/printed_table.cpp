@@ -39,7 +39,9 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
       if (!stream_) throw OutputError(fmt::format("{}: cannot be written", options_.csv));
     }
   }
-  if (options_.json) {
+  if (options_.quiet) {
+    // What is on stdout is another table.
+  } else if (options_.json) {
     Json facts;
     for (const auto& [name, value] : table_.facts) facts[name] = value;
     fmt::print("{{\"facts\": {},\n \"rows\": [", json_text(facts, -1));
@@ -50,11 +52,13 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
 }
 
 PrintedTable::~PrintedTable() {
-  if (options_.json) fmt::print("]}}\n");
+  if (options_.json && !options_.quiet) fmt::print("]}}\n");
 }
 
 void PrintedTable::row(const std::vector<std::string>& cells) {
-  if (options_.json) {
+  if (options_.quiet) {
+    // As of the constructor.
+  } else if (options_.json) {
     Json row;
     for (std::size_t k = 0; k < cells.size(); ++k) row[table_.columns[k]] = value_of(cells[k]);
     fmt::print("{}\n  {}", table_.rows.empty() ? "" : ",", json_text(row, -1));

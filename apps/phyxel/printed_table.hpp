@@ -13,6 +13,7 @@ struct TableOptions {
   std::string csv;     ///< CSV file; "" for none.
   bool force = false;  ///< True if the file may be replaced.
   bool json = false;   ///< True for JSON on stdout instead of CSV.
+  bool quiet = false;  ///< True for nothing on stdout.
 };
 void add_table_options(CLI::App& command, TableOptions& options);
 

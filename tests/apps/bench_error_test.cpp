@@ -66,7 +66,21 @@ TEST_F(BenchError, TakesTheTimesOfAnEarlierTable) {
     return text.substr(text.find("\nproblem,"));
   };
   EXPECT_EQ(rows_of("one.csv"), rows_of("other.csv"));
+  const test::Outcome json = run({"bench", "error", "--from", "error.csv", "--json"});
+  ASSERT_EQ(json.code, 0) << json.err;
+  const nlohmann::json found = nlohmann::json::parse(json.out);
+  EXPECT_EQ(found["rows"][0]["problem"], "tension");
+  EXPECT_TRUE(found["rows"][0]["seconds"].is_number());
   EXPECT_EQ(run({"bench", "error", "--from", "missing.csv"}).code, 2);
+}
+
+TEST_F(BenchError, PrintsOneObjectAsJson) {
+  const test::Outcome bench =
+      run({"bench", "error", "tension", "--across", "3,4", "--lattice", "nodes", "--factor", "1.8",
+           "--device", "cpu", "--seconds", "0.01", "--json", "--fastest", "fastest.csv"});
+  ASSERT_EQ(bench.code, 0) << bench.err;
+  EXPECT_TRUE(nlohmann::json::parse(bench.out)["rows"][0].contains("rest_seconds"));
+  EXPECT_THAT(test::text_of(folder_ / "fastest.csv"), HasSubstr("\ntension,E,nodes,"));
 }
 
 TEST_F(BenchError, RefusesUnknownProblems) {
