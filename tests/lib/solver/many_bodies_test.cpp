@@ -238,7 +238,8 @@ TEST(LayerWatch, KeepsListsAsLongAsTheyHold) {
           rare.found(bodies.layer.reach_at(position, rare.skins(), near));
         }
       }
-      EXPECT_LE(way + step_way - found_at, rare.skins()[0] * (1 + 1e-12)) << step;
+      // Speeds may double in this step.
+      EXPECT_LE(way + 2 * step_way - found_at, rare.skins()[0] * (1 + 1e-12)) << step;
     }
     // Lists hold for 24 steps; speeds may double in the last ones.
     EXPECT_LE(searches, since == 0 ? 11 : 12);
