@@ -234,10 +234,16 @@ Vec3d Obstacle::middle() const { return surface ? distances->deepest : Vec3d{}; 
 double Obstacle::largest_speed(const ObstacleStep& step) const {
   double square = 0;  // of the change of the rotation, whose rate is 1/sqrt(2) of it
   for (int e = 0; e < 9; ++e) square += step.slope(e / 3, e % 3) * step.slope(e / 3, e % 3);
-  double reach = 0;
-  for (const double length : form.lengths) reach += length;
+  double reach = 0;  // of its surface from its origin
   if (surface) {
     for (const Vec3d x : surface->position) reach = std::max(reach, norm(x));
+  } else if (is_bounded()) {
+    ObstacleShapes::with(form, [&](const auto& shape) {
+      if constexpr (requires { shape.for_each_tip([](Vec3d, double, Vec3d) {}); }) {
+        shape.for_each_tip(
+            [&](Vec3d x, double radius, Vec3d) { reach = std::max(reach, norm(x) + radius); });
+      }
+    });
   }
   return norm(step.velocity) + std::sqrt(0.5 * square) * reach;
 }

@@ -47,6 +47,7 @@ RigidTips::RigidTips(const Model& model) : model_(model) {
   tips_.resize(count);
   radius_.assign(count, 0);
   middle_.resize(count);
+  inside_.resize(count);
   placed_.resize(count);
   for (std::size_t k = 0; k < free.size(); ++k) placed_[free[k]].free = static_cast<int>(k);
   for (std::size_t o = 0; o < count; ++o) {
@@ -58,8 +59,9 @@ RigidTips::RigidTips(const Model& model) : model_(model) {
     } else {
       ObstacleShapes::with(obstacle.form, [&](const auto& shape) {
         if constexpr (requires { shape.solid(); }) {
-          shape.for_each_tip([&](Vec3d x, double radius) {
+          shape.for_each_tip([&](Vec3d x, double radius, Vec3d core) {
             tips_[o].push_back(x);
+            inside_[o].push_back(core);
             radius_[o] = radius;
           });
         }
@@ -68,6 +70,14 @@ RigidTips::RigidTips(const Model& model) : model_(model) {
     for (const Vec3d x : tips_[o]) middle_[o] += x / static_cast<double>(tips_[o].size());
     double& reach = placed_[o].reach;
     for (const Vec3d x : tips_[o]) reach = std::max(reach, norm(x - middle_[o]) + radius_[o]);
+    inside_[o].resize(tips_[o].size(), middle_[o]);  // of meshes
+    // Of long and flat bodies no farther than they are thick: there lie other normals.
+    const double way = std::min(0.1 * reach, 0.5 * obstacle.inner_radius());
+    for (std::size_t k = 0; k < tips_[o].size(); ++k) {
+      const Vec3d inwards = inside_[o][k] - tips_[o][k];
+      inside_[o][k] = tips_[o][k];
+      if (norm(inwards) > 0) inside_[o][k] += way * normalised(inwards);
+    }
   }
 }
 

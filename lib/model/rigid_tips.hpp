@@ -52,18 +52,21 @@ class RigidTips {
     const double radius = radius_[of_tips.obstacle];
     ObstacleShapes::with(model_.obstacles[other.obstacle].form, [&](const auto& shape) {
       if (gap_to(shape, other.step, of_tips.centre).distance > of_tips.reach) return;
-      for (const Vec3d tip : tips_[of_tips.obstacle]) {
-        const Vec3d x = of_tips.step.turn * tip + of_tips.step.place;
+      const std::vector<Vec3d>& tips = tips_[of_tips.obstacle];
+      for (std::size_t k = 0; k < tips.size(); ++k) {
+        const Vec3d x = of_tips.step.turn * tips[k] + of_tips.step.place;
         Gap gap = gap_to(shape, other.step, x);
         if (!(gap.distance < radius)) continue;
         // On edges and corners of the other body, the face through which the tip has come is the
-        // one nearest to a place inside its own body.
-        constexpr double share = 0.1;
-        const Vec3d inside = x + share * of_tips.reach * normalised(of_tips.centre - x);
-        const Gap from = gap_to(shape, other.step, inside);
-        constexpr double alike = 0.7;  // cosine
-        if (dot(from.normal, gap.normal) < alike) {
-          gap = {from.distance + dot(from.normal, x - inside), from.normal};
+        // one nearest to a place inside its own body. The centre of a ball is such a place.
+        if (radius == 0) {
+          const Vec3d inside =
+              of_tips.step.turn * inside_[of_tips.obstacle][k] + of_tips.step.place;
+          const Gap from = gap_to(shape, other.step, inside);
+          constexpr double alike = 0.7;  // cosine
+          if (dot(from.normal, gap.normal) < alike) {
+            gap = {from.distance + dot(from.normal, x - inside), from.normal};
+          }
         }
         gap.distance -= radius;
         if (gap.distance < 0) each(of_tips, other, x - radius * gap.normal, gap);
@@ -72,10 +75,11 @@ class RigidTips {
   }
 
   const Model& model_;
-  std::vector<std::vector<Vec3d>> tips_;  // of each obstacle, in its own coordinates [m]
-  std::vector<double> radius_;            // of the tips of each obstacle [m]
-  std::vector<Vec3d> middle_;             // of the ball around them, likewise [m]
-  std::vector<Placed> placed_;            // of each obstacle
+  std::vector<std::vector<Vec3d>> tips_;    // of each obstacle, in its own coordinates [m]
+  std::vector<double> radius_;              // of the tips of each obstacle [m]
+  std::vector<Vec3d> middle_;               // of the ball around them, likewise [m]
+  std::vector<std::vector<Vec3d>> inside_;  // places inside the body beside these, likewise [m]
+  std::vector<Placed> placed_;              // of each obstacle
 };
 
 /// The error of a model in which a free body overlaps another obstacle at the start; empty if none

@@ -70,6 +70,7 @@ void ContactPenalty::for_each_force(const PlacedObstacles& at, const Vector& u, 
 void ContactPenalty::find_rubbing(const PlacedObstacles& at, const Vector& u,
                                   const SlipMeasure& slip) {
   rubbing_.clear();
+  if (slip.from.empty()) return;  // before a search, slips are not known
   record_.begin_linearise();
   slip_share_ = slip.share;
   const PlacedLayer layer(model_, groups_, [&](Index i) { return u[i]; });

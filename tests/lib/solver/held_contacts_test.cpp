@@ -148,6 +148,17 @@ TEST(HeldContacts, AlongSomeAxesTakeTheirPartOfAnObstaclesForce) {
   }
 }
 
+/// Slips are not known before a search for rest, nor is friction.
+TEST(HeldContacts, HaveReactionsBeforeASearchForRestWithFriction) {
+  Held way(on_slope("equilibrium", "friction = 0.2\n"), dt);
+  EXPECT_TRUE(std::isfinite(norm(way.reactions().at(0).force)));
+  way.solver.step(1);
+  const double weight = way.mass();
+  const Vec3d force = way.contacts().at(0).force, reaction = way.reactions().at(0).force;
+  EXPECT_NEAR(reaction.x, -force.x, 1e-6 * weight);  // residual forces of searches
+  EXPECT_NEAR(force.z, weight, 1e-3 * weight);
+}
+
 /// A block that is moved along x, and held along y, slides on a floor that bears it.
 TEST(HeldContacts, AlongSomeAxesRubOnObstacles) {
   for (const std::string method : {"", "method = 'penalty'\n"}) {

@@ -148,6 +148,42 @@ TEST(RigidBodies, PassOnTheirVelocityAsInACradle) {
   }
 }
 
+TEST(RigidBodies, AreAsFastAsTheirFastestPoint) {
+  const auto speed = [](const std::string& shape) {
+    const Rigid way(scene_of({}, obstacle(shape + "density = 10\nspin = [0, 100, 0]\n")), dt);
+    const Obstacle& obstacle = way.model.obstacles[0];
+    return obstacle.largest_speed(obstacle.placed(obstacle.start));
+  };
+  EXPECT_NEAR(speed("shape = 'box'\nsize = [0.6, 0.03, 0.03]\n"), 50 * norm(Vec3d{0.6, 0.03, 0.03}),
+              1e-12);
+  EXPECT_NEAR(speed("shape = 'cylinder'\nradius = 0.05\nlength = 0.1\n"), 5 * std::sqrt(2.0),
+              1e-12);
+  EXPECT_NEAR(speed("shape = 'capsule'\nradius = 0.05\nlength = 0.1\n"), 10, 1e-12);
+  EXPECT_NEAR(speed("shape = 'sphere'\nradius = 0.05\n"), 5, 1e-12);
+}
+
+/// Long sticks fall onto another one that crosses them, off its middle: without restitution, an
+/// impact takes energy.
+TEST(RigidBodies, MakeNoEnergyWhereSticksCross) {
+  for (const std::string shape : {"shape = 'capsule'\nradius = 0.01\nlength = 0.4\n",
+                                  "shape = 'cylinder'\nradius = 0.01\nlength = 0.4\n",
+                                  "shape = 'box'\nsize = [0.02, 0.02, 0.4]\n"}) {
+    for (int k = 0; k < 12; ++k) {
+      const double turn = 85 + k, off = 0.012 * k;
+      Rigid way(scene_of({}, obstacle(shape + "rotation = [90, 0, 0]\n") +
+                                 obstacle(shape + fmt::format("rotation = [0, {}, 0]\n"
+                                                              "translation = [{}, {}, 0.05]\n"
+                                                              "velocity = [0, 0, -0.2]\n"
+                                                              "density = 1000\n",
+                                                              turn, off, 0.3 * off))),
+                1e-3);
+      const double before = way.read().kinetic_energy;
+      way.solver.step(400);
+      EXPECT_LT(way.read().kinetic_energy, before) << shape << turn << ' ' << off;
+    }
+  }
+}
+
 TEST(RigidBodies, StandInAStack) {
   std::string boxes;
   for (int k = 0; k < 5; ++k) {

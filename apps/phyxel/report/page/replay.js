@@ -311,12 +311,11 @@ function addCharts() {
     charts.push(made);
     document.getElementById('charts').append(element('div', {}, element('h2', {}, title), made));
   };
-  // With contact, all parts of the total: their sum is constant where the total is.
+  // All parts of the total: their sum is constant where the total is.
   const lost = {contact_energy: 'springs of contact', friction_heat: 'heat of friction', impact_loss: 'lost in impacts',
                 other_contact_loss: 'lost otherwise in contact', plastic_work: 'plastic work', viscous_work: 'viscous work'};
   const parts = ['kinetic_energy', 'strain_energy', 'volume_energy', 'hourglass_energy', 'gravity_energy', 'load_energy'];
-  const touching = column('other_contact_loss') >= 0;
-  chart('Energy', 'energy [J]', [...parts, ...(touching ? Object.keys(lost) : []), 'total_energy'], n => lost[n] ?? n.replace('_energy', ''));
+  chart('Energy', 'energy [J]', [...parts, ...Object.keys(lost), 'total_energy'], n => lost[n] ?? n.replace('_energy', ''));
   chart('Momentum', 'momentum [kg m/s]', ['momentum_x', 'momentum_y', 'momentum_z'], n => n.slice(-1));
   chart('Angular momentum', 'angular momentum [kg m²/s]', ['angular_momentum_x', 'angular_momentum_y', 'angular_momentum_z'], n => n.slice(-1));
   chart('Largest displacement', 'displacement [m]', ['largest_displacement'], () => 'largest displacement');

@@ -1,6 +1,7 @@
 /// A box as an obstacle.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "phyxel/physics/obstacle.hpp"
@@ -30,20 +31,31 @@ struct BoxObstacle {
         size_x * size_y * size_z,
         {size_x * size_x / 12, size_y * size_y / 12, size_z * size_z / 12});
   }
-  /// Calls each(x, radius) for the balls by which it touches other rigid bodies: they reach its
-  /// surface where it sticks out.
+  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
+  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
   template <class Each>
   void for_each_tip(Each&& each) const {
-    constexpr int parts = 4;  // of an edge
-    for (int i = 0; i <= parts; ++i) {
-      for (int j = 0; j <= parts; ++j) {
-        for (int k = 0; k <= parts; ++k) {
-          const int inner = (i % parts != 0) + (j % parts != 0) + (k % parts != 0);
-          const int middle = (2 * i == parts) + (2 * j == parts) + (2 * k == parts);
+    // Parts of edges are no longer than half of the thickness: what crosses an edge meets some.
+    const double thickness = std::min({size_x, size_y, size_z}),
+                 part = std::max(0.5 * thickness, std::max({size_x, size_y, size_z}) / 64);
+    const auto parts_of = [&](double size) {
+      return 4 * static_cast<int>(std::ceil(size / (4 * part)));
+    };
+    const int nx = parts_of(size_x), ny = parts_of(size_y), nz = parts_of(size_z);
+    const auto at = [](int n, int parts, double size) { return (n / double(parts) - 0.5) * size; };
+    const auto core = [&](double value, double size) {
+      const double most = 0.5 * (size - thickness);
+      return std::clamp(value, -most, most);
+    };
+    for (int i = 0; i <= nx; ++i) {
+      for (int j = 0; j <= ny; ++j) {
+        for (int k = 0; k <= nz; ++k) {
+          const int inner = (i % nx != 0) + (j % ny != 0) + (k % nz != 0);
+          const int middle = (2 * i == nx) + (2 * j == ny) + (2 * k == nz);
           // Corners, edges, and the middle of each face.
           if (inner == 3 || (inner == 2 && middle != 2)) continue;
-          const auto at = [](int n, double size) { return (n / double{parts} - 0.5) * size; };
-          each(Vec3d{at(i, size_x), at(j, size_y), at(k, size_z)}, 0.0);
+          const Vec3d x{at(i, nx, size_x), at(j, ny, size_y), at(k, nz, size_z)};
+          each(x, 0.0, Vec3d{core(x.x, size_x), core(x.y, size_y), core(x.z, size_z)});
         }
       }
     }

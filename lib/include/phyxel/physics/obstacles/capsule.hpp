@@ -35,12 +35,15 @@ struct CapsuleObstacle {
     const double volume = middle + ends;
     return SolidMoments::about_origin(volume, {across / volume, across / volume, along / volume});
   }
-  /// Calls each(x, radius) for the balls by which it touches other rigid bodies: they reach its
-  /// surface where it sticks out.
+  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
+  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
   template <class Each>
   void for_each_tip(Each&& each) const {
     constexpr int parts = 16;
-    for (int n = 0; n <= parts; ++n) each(Vec3d{0, 0, (n / double{parts} - 0.5) * length}, radius);
+    for (int n = 0; n <= parts; ++n) {
+      const Vec3d x{0, 0, (n / double{parts} - 0.5) * length};
+      each(x, radius, x);
+    }
   }
 };
 

@@ -1,6 +1,7 @@
 /// A cylinder as an obstacle.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -31,20 +32,30 @@ struct CylinderObstacle {
     return SolidMoments::about_origin(std::numbers::pi * radius * radius * length,
                                       {across, across, length * length / 12});
   }
-  /// Calls each(x, radius) for the balls by which it touches other rigid bodies: they reach its
-  /// surface where it sticks out.
+  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
+  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
   template <class Each>
   void for_each_tip(Each&& each) const {
     constexpr int around = 96, parts = 4;  // rolls as smoothly as a polygon of so many sides
+    constexpr int fewer = 4;  // on rings between, by which sticks that cross it meet it
+    const int rings =
+        parts * static_cast<int>(std::ceil(std::clamp(length / radius / 2, 1.0, 16.0)));
+    const double depth = std::min(radius, 0.5 * length);
+    const auto add = [&](Vec3d x, double r) {
+      const double most = 0.5 * length - depth, part = std::min(r, radius - depth) / r;
+      each(x, 0.0, Vec3d{part * x.x, part * x.y, std::clamp(x.z, -most, most)});
+    };
     for (int k = 0; k < around; ++k) {
       const double angle = 2 * std::numbers::pi * k / around;
       const Vec3d out{std::cos(angle), std::sin(angle), 0};
       const auto at = [&](double r, int n) {
-        return Vec3d{r * out.x, r * out.y, (n / double{parts} - 0.5) * length};
+        return Vec3d{r * out.x, r * out.y, (n / double(rings) - 0.5) * length};
       };
-      for (int n = 0; n <= parts; ++n) each(at(radius, n), 0.0);
+      for (int n = 0; n <= rings; ++n) {
+        if (n % (rings / parts) == 0 || k % fewer == 0) add(at(radius, n), radius);
+      }
       if (k % 12 != 0) continue;  // the ends
-      for (int n = 0; n <= parts; n += parts) each(at(radius / 2, n), 0.0);
+      for (int n = 0; n <= rings; n += rings) add(at(radius / 2, n), radius / 2);
     }
   }
 };
