@@ -107,10 +107,22 @@ void ImplicitStep::add_support_work(const SupportInstant& now) {
   }
 }
 
-void ImplicitStep::add_contact(const Vector& u, const Vector& v, double time,
+void ImplicitStep::add_contact(const Vector& u, const Vector& v, const Vector& path, double time,
                                StepSums& sums) const {
-  newton_.contact().add_to(balance_.obstacles, u, v, time,
+  if (newton_.contact().empty()) return;
+  Vector whole = v;
+  newton_.vectors().for_each([&](Index i) { whole[i] += path[i]; });
+  newton_.contact().add_to(balance_.obstacles, u, whole, time,
                            std::span(sums).subspan(sums_of_motions(model_)));
+}
+
+ImplicitStep::Vector ImplicitStep::path_velocities(std::int64_t step, double dt) const {
+  const OwnedVectors& vectors = newton_.vectors();
+  Vector before = vectors.make(), after = vectors.make();
+  prescribe_displacements(model_, static_cast<double>(step) * dt, before);
+  prescribe_displacements(model_, static_cast<double>(step + 1) * dt, after);
+  vectors.for_each([&](Index i) { after[i] = (1 / dt) * (after[i] - before[i]); });
+  return after;
 }
 
 void ImplicitStep::take(State& state) {
@@ -143,7 +155,8 @@ void ImplicitStep::take_both_stages(State& state) {
   }
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, v, u2, v2);
-  add_contact(u2, v2, rest, support_work_);
+  const Vector path = path_velocities(state.step, dt);
+  add_contact(u2, v2, path, rest, support_work_);
   // The start extrapolates the velocity and acceleration of the first stage over the rest of the
   // step.
   Vector from = vectors.make();
@@ -155,16 +168,10 @@ void ImplicitStep::take_both_stages(State& state) {
   });
   backend_.set_history_interval(dt);
   Vector force = take_stage(end, s, from, moving, u2, v2);
-  add_contact(u2, v2, s, support_work_);
+  add_contact(u2, v2, path, s, support_work_);
   end_contact_ = no_step_sums(model_);
-  add_contact(u2, v2, 1, end_contact_);
-  Vector before = vectors.make(), after = vectors.make();
-  prescribe_displacements(model_, begin, before);
-  prescribe_displacements(model_, end, after);
-  vectors.for_each([&](Index i) {
-    const Vec3d along_path = (1 / dt) * (after[i] - before[i]);
-    v2[i] = by_components(balance_.free[i], v2[i]) + along_path;
-  });
+  add_contact(u2, v2, path, 1, end_contact_);
+  vectors.for_each([&](Index i) { v2[i] = by_components(balance_.free[i], v2[i]) + path[i]; });
   vectors.refresh_ghosts(u2);
   backend_.put_displacements(u2);
   backend_.commit_history();

@@ -59,8 +59,12 @@ class ImplicitStep {
   void take_both_stages(State& state);
   /// Adds the work of supports at an instant.
   void add_support_work(const SupportInstant& now);
-  /// Adds what contact does over a time [s] at the end of a stage.
-  void add_contact(const Vector& u, const Vector& v, double time, StepSums& sums) const;
+  /// Adds what contact does over a time [s] at the end of a stage. @param v along free axes, and
+  /// `path` along prescribed ones [m/s]
+  void add_contact(const Vector& u, const Vector& v, const Vector& path, double time,
+                   StepSums& sums) const;
+  /// The mean velocities of supports over a step, zero along free axes [m/s].
+  Vector path_velocities(std::int64_t step, double dt) const;
 
   const Model& model_;
   Backend& backend_;

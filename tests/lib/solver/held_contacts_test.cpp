@@ -159,6 +159,35 @@ TEST(HeldContacts, HaveReactionsBeforeASearchForRestWithFriction) {
   EXPECT_NEAR(force.z, weight, 1e-3 * weight);
 }
 
+/// The heat of implicit steps is that of slips which supports impose, too: μ times weight times
+/// way.
+TEST(HeldContacts, MakeHeatOfImposedSlipsInImplicitSteps) {
+  const std::string scene =
+      "gravity = [0, 0, -9.81]\n[solver]\nprecision = 'double'\n"
+      "method = 'implicit'\n" +
+      end;
+  const std::string moved = "[[body.motion]]\nall = true\naxes = 'xy'\nvelocity = [0.1, 0, 0]\n";
+  const std::string bed =
+      "[[body]]\nname = 'bed'\nshape = 'block'\nsize = [0.4, 0.3, 0.1]\n"
+      "spacing = 0.05\nlattice = 'nodes'\ntranslation = [0, 0, -0.15]\n"
+      "[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n"
+      "[[body.fixed]]\nall = true\n";
+  for (const bool on_body : {false, true}) {
+    Held way(scene +
+                 (on_body ? "[contact]\nfriction = 0.3\n" + bed
+                          : obstacle("shape = 'plane'\nfriction = 0.3\n"
+                                     "translation = [0, 0, -0.1]\n")) +
+                 block() + moved,
+             0.01);
+    way.solver.step(20);
+    double heat = 0, weight = g * way.mass();
+    if (on_body) weight *= 8.0 / 20;  // of the block alone
+    for (const ContactReading& reading : way.contacts()) heat += reading.friction_heat;
+    // The block comes to rest on what bears it in the first steps.
+    EXPECT_NEAR(heat, 0.3 * weight * 0.02, 0.1 * 0.3 * weight * 0.02) << on_body;
+  }
+}
+
 /// A block that is moved along x, and held along y, slides on a floor that bears it.
 TEST(HeldContacts, AlongSomeAxesRubOnObstacles) {
   for (const std::string method : {"", "method = 'penalty'\n"}) {
