@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -295,13 +296,25 @@ def test_runs_tell_how_far_they_are():
 def test_ctrl_c_stops_a_set_up():
     heard = {}
     previous = signal.signal(signal.SIGALRM, signal.default_int_handler)
-    signal.setitimer(signal.ITIMER_REAL, 0.3)  # of seconds
+
+    def interrupt():  # as soon as the set-up has begun, however slow the machine is
+        while not heard and sampling.is_set():
+            time.sleep(0.01)
+        os.kill(os.getpid(), signal.SIGALRM)
+
+    sampling = threading.Event()
+    sampling.set()
+    thread = threading.Thread(target=interrupt)
     try:
         with pytest.raises(KeyboardInterrupt):
+            thread.start()
             # A method of dict runs no Python code, which would hear the signal itself.
             phyxel.sample(cube(), phyxels=300000, progress=heard.__setitem__)
+            sampling.clear()
+            thread.join()
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
+        sampling.clear()
+        thread.join()
         signal.signal(signal.SIGALRM, previous)
     assert heard and "volumes of phyxels" not in heard  # the last stage
 
