@@ -30,4 +30,10 @@ std::vector<std::vector<T>> exchanged(const Communicator& ranks,
   return all;
 }
 
+/// Gathers the values of all ranks, by rank. Collective.
+template <class T>
+std::vector<std::vector<T>> allgathered(const Communicator& ranks, const std::vector<T>& values) {
+  return exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), values));
+}
+
 }  // namespace phyxel

@@ -23,16 +23,6 @@ std::string today() {
   return text;
 }
 
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> cells;
-  std::size_t begin = 0;
-  for (std::size_t end; (end = line.find(',', begin)) != std::string::npos; begin = end + 1) {
-    cells.push_back(line.substr(begin, end - begin));
-  }
-  cells.push_back(line.substr(begin));
-  return cells;
-}
-
 std::string on_one_line(std::string text) {
   std::replace(text.begin(), text.end(), '\n', ' ');
   return text;
@@ -134,6 +124,28 @@ void write_csv(const std::filesystem::path& file, const CsvTable& table) {
   write_whole_file(file, csv_text(table), Durable::no);
 }
 
+std::vector<std::string> csv_cells(const std::string& line) {
+  std::vector<std::string> cells(1);
+  bool is_quoted = false;
+  for (std::size_t k = 0; k < line.size(); ++k) {
+    std::string& cell = cells.back();
+    const bool begins = k == 0 || (!is_quoted && line[k - 1] == ',');
+    if (line[k] == '"' && (is_quoted || begins)) {
+      const bool is_doubled = is_quoted && k + 1 < line.size() && line[k + 1] == '"';
+      if (is_doubled) {
+        cell += line[++k];
+      } else {
+        is_quoted = !is_quoted;
+      }
+    } else if (line[k] == ',' && !is_quoted) {
+      cells.emplace_back();
+    } else {
+      cell += line[k];
+    }
+  }
+  return cells;
+}
+
 CsvTable read_csv(const std::filesystem::path& file) {
   std::istringstream in(read_text_file(file, std::size_t{64} << 20));
   CsvTable table;
@@ -146,9 +158,9 @@ CsvTable read_csv(const std::filesystem::path& file) {
         table.facts.emplace_back(line.substr(2, colon - 2), line.substr(colon + 2));
       }
     } else if (table.columns.empty()) {
-      table.columns = split(line);
+      table.columns = csv_cells(line);
     } else if (!line.empty()) {
-      table.rows.push_back(split(line));
+      table.rows.push_back(csv_cells(line));
       if (table.rows.back().size() != table.columns.size()) {
         throw InputError(fmt::format("{}:{}: {} cells under {} columns", file.string(), number,
                                      table.rows.back().size(), table.columns.size()));

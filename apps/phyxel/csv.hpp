@@ -47,6 +47,9 @@ std::string csv_text(const CsvTable& table);
 /// The line of a row, without the line's end.
 std::string csv_row(const std::vector<std::string>& cells);
 
+/// The cells of a line, which may be quoted (RFC 4180).
+std::vector<std::string> csv_cells(const std::string& line);
+
 /// Reads a table. @throws InputError if the file cannot be read, or a row and the header differ in
 ///   the number of cells
 CsvTable read_csv(const std::filesystem::path& file);

@@ -39,16 +39,15 @@ PrintedTable::PrintedTable(TableOptions options, const std::vector<std::string>&
       if (!stream_) throw OutputError(fmt::format("{}: cannot be written", options_.csv));
     }
   }
-  if (options_.quiet) {
-    // What is on stdout is another table.
-  } else if (options_.json) {
-    Json facts;
-    for (const auto& [name, value] : table_.facts) facts[name] = value;
-    fmt::print("{{\"facts\": {},\n \"rows\": [", json_text(facts, -1));
-  } else {
-    fmt::print("{}", csv_text(table_));
-  }
+  if (!options_.quiet) print_head();
   write();
+}
+
+void PrintedTable::print_head() const {
+  if (!options_.json) return fmt::print("{}", csv_text(table_));
+  Json facts;
+  for (const auto& [name, value] : table_.facts) facts[name] = value;
+  fmt::print("{{\"facts\": {},\n \"rows\": [", json_text(facts, -1));
 }
 
 PrintedTable::~PrintedTable() {
@@ -56,9 +55,13 @@ PrintedTable::~PrintedTable() {
 }
 
 void PrintedTable::row(const std::vector<std::string>& cells) {
-  if (options_.quiet) {
-    // As of the constructor.
-  } else if (options_.json) {
+  if (!options_.quiet) print(cells);
+  table_.rows.push_back(cells);
+  write();
+}
+
+void PrintedTable::print(const std::vector<std::string>& cells) const {
+  if (options_.json) {
     Json row;
     for (std::size_t k = 0; k < cells.size(); ++k) row[table_.columns[k]] = value_of(cells[k]);
     fmt::print("{}\n  {}", table_.rows.empty() ? "" : ",", json_text(row, -1));
@@ -66,8 +69,6 @@ void PrintedTable::row(const std::vector<std::string>& cells) {
     fmt::print("{}\n", csv_row(cells));
   }
   std::fflush(stdout);
-  table_.rows.push_back(cells);
-  write();
 }
 
 void PrintedTable::write() {

@@ -33,6 +33,8 @@ class PrintedTable {
   void row(const std::vector<std::string>& cells);
 
  private:
+  void print_head() const;
+  void print(const std::vector<std::string>& cells) const;
   void write();
 
   TableOptions options_;

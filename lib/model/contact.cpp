@@ -196,10 +196,10 @@ double contact_offset(double distance, double spacing, bool has_layer) {
 namespace {
 
 /// Adds the points of surfaces that are held or moved along all axes, for free rigid bodies. Of a
-/// share: collective.
-void add_held_points(Model& model, std::span<const double> offset) {
+/// share: collective. @param supported as of `supported_phyxels`
+void add_held_points(Model& model, std::span<const double> offset,
+                     std::span<const char> supported) {
   if (free_bodies(model).empty()) return;
-  const std::vector<char> supported = supported_phyxels(model);
   std::map<Index, HeldPoint> found;  // by index
   for (std::size_t m = 0; m < model.motions.size(); ++m) {
     const Axes axes = model.motions[m].axes;
@@ -221,8 +221,7 @@ void add_held_points(Model& model, std::span<const double> offset) {
   if (model.share) {
     const Communicator& ranks = *model.share->communicator;
     model.held_points.clear();
-    for (const std::vector<HeldPoint>& some :
-         exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), own))) {
+    for (const std::vector<HeldPoint>& some : allgathered(ranks, own)) {
       model.held_points.insert(model.held_points.end(), some.begin(), some.end());
     }
   }
@@ -234,8 +233,8 @@ void add_held_points(Model& model, std::span<const double> offset) {
 
 void add_contact_layer(Model& model, std::span<const double> offset) {
   if (model.obstacles.empty()) return;
-  add_held_points(model, offset);
   const std::vector<char> supported = supported_phyxels(model);
+  add_held_points(model, offset, supported);
   for (Index i = 0; i < model.size(); ++i) {
     if (offset[i] < 0 || supported[i] || !model.owns(i)) continue;
     model.contact.phyxels.push_back(i);

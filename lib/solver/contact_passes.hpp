@@ -69,7 +69,8 @@ struct ContactPasses {
   SurfaceResponse* response = nullptr;     ///< Of each row.
   SurfaceForce* force = nullptr;           ///< Of each row.
   SurfaceShare* carries = nullptr;         ///< Of each entry.
-  /// In front of each part of a point's `entries_of`: those that carry a force. How many these are.
+  /// The entries of each point that carry a force, at the start of the place of each part of its
+  /// `entries_of`, and the number of these entries.
   SurfaceCarrier* carriers = nullptr;
   Index* carrier_count = nullptr;  ///< Shape [contact_threads, points].
   /// Of each entry: true if it is of its row's patch; null if no point is beside several.

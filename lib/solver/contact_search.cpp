@@ -102,8 +102,7 @@ std::vector<ContactCandidate> of_all_ranks(const Model& model, std::vector<Conta
   if (!model.share) return some;
   const Communicator& ranks = *model.share->communicator;
   std::vector<ContactCandidate> all;
-  for (const auto& of_rank :
-       exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), some))) {
+  for (const auto& of_rank : allgathered(ranks, some)) {
     all.insert(all.end(), of_rank.begin(), of_rank.end());
   }
   std::sort(all.begin(), all.end(),

@@ -1,4 +1,4 @@
-/// Speeds at which what touches might pass through each other in a step.
+/// The check of speeds at which bodies and obstacles might pass through each other in a step.
 #include <fmt/format.h>
 
 #include <algorithm>

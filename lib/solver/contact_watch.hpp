@@ -28,7 +28,7 @@ class ContactWatch {
   explicit ContactWatch(int rarest) : rarest_(rarest) {}
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return dt != dt_ || --left_ <= 0; }
-  /// True if it will be time before the next step.
+  /// True if the next look is due before the next step.
   bool is_due_next() const { return left_ <= 1; }
   /// True if points have been found for steps of `dt` [s].
   bool has_found(double dt) const { return generation_ > 0 && dt == dt_; }
@@ -41,8 +41,6 @@ class ContactWatch {
   void put_off(double steps = HUGE_VAL) {
     left_ = static_cast<int>(std::clamp(steps, 1.0, static_cast<double>(rarest_)));
   }
-  /// Asks for a look before the next step.
-  void look_next() { left_ = 1; }
   /// Most steps between two looks.
   int rarest() const { return rarest_; }
   /// How often points had to be found.
@@ -72,10 +70,10 @@ class LayerWatch {
 
   /// True if it is time to look where phyxels are, before a step of `dt` [s].
   bool is_due(double dt) { return watch_.is_due(dt); }
-  /// True if it will be time before the next step.
+  /// True if the next look is due before the next step.
   bool is_due_next() const { return watch_.is_due_next(); }
   /// Asks for a look before the next step, since phyxels have been moved other than by steps.
-  void look_next() { watch_.look_next(); }
+  void look_next() { watch_.put_off(1); }
   /// True if points have to be found anew before a step of `dt` [s]. Of a share: collective.
   /// @param ways of the groups since points were found, zero before that
   /// @param since steps since the time of these ways
@@ -132,8 +130,8 @@ class LayerWatch {
   /// Calls visit(a, b) for bodies whose boxes overlap; with a = b if bodies may touch themselves.
   template <class Visit>
   void for_each_meeting(std::span<const Box> boxes, Visit&& visit);
-  /// The number of steps in which bodies can't touch at places that are not among the points, as
-  /// far as the next look.
+  /// The number of steps for which the lists hold: bodies touch at no place that is not among the
+  /// points. Infinite if that is beyond the next look.
   double steps_left(const BodyMotions& bodies, double dt);
   /// Sets the skins of bodies by the relative speeds of those that may soon be near each other; of
   /// all bodies before points are found. @returns the number of steps that they last for

@@ -126,8 +126,7 @@ void keep_deeper(HeldOverlap& kept, const HeldOverlap& other) {
 void keep_deepest_of_ranks(const Model& model, std::vector<HeldOverlap>& overlaps) {
   if (!model.share) return;
   const Communicator& ranks = *model.share->communicator;
-  for (const std::vector<HeldOverlap>& some :
-       exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), overlaps))) {
+  for (const std::vector<HeldOverlap>& some : allgathered(ranks, overlaps)) {
     for (std::size_t k = 0; k < overlaps.size(); ++k) keep_deeper(overlaps[k], some[k]);
   }
 }
@@ -157,8 +156,7 @@ class HeldMeetings {
     });
     if (model.share) {
       const Communicator& ranks = *model.share->communicator;
-      for (const std::vector<Box>& some :
-           exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), boxes_))) {
+      for (const std::vector<Box>& some : allgathered(ranks, boxes_)) {
         for (std::size_t b = 0; b < boxes_.size(); ++b) boxes_[b] = together(boxes_[b], some[b]);
       }
     }
@@ -169,8 +167,7 @@ class HeldMeetings {
     if (model.share) {
       const Communicator& ranks = *model.share->communicator;
       all_.clear();
-      for (const std::vector<HeldPhyxel>& some :
-           exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), own_))) {
+      for (const std::vector<HeldPhyxel>& some : allgathered(ranks, own_)) {
         all_.insert(all_.end(), some.begin(), some.end());
       }
     }

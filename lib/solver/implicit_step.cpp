@@ -107,12 +107,9 @@ void ImplicitStep::add_support_work(const SupportInstant& now) {
   }
 }
 
-void ImplicitStep::add_contact(const Vector& u, const Vector& v, const Vector& path, double time,
+void ImplicitStep::add_contact(const Vector& u, const Vector& v, double time,
                                StepSums& sums) const {
-  if (newton_.contact().empty()) return;
-  Vector whole = v;
-  newton_.vectors().for_each([&](Index i) { whole[i] += path[i]; });
-  newton_.contact().add_to(balance_.obstacles, u, whole, time,
+  newton_.contact().add_to(balance_.obstacles, u, v, time,
                            std::span(sums).subspan(sums_of_motions(model_)));
 }
 
@@ -156,7 +153,13 @@ void ImplicitStep::take_both_stages(State& state) {
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, v, u2, v2);
   const Vector path = path_velocities(state.step, dt);
-  add_contact(u2, v2, path, rest, support_work_);
+  // Stages leave velocities along prescribed axes out.
+  const auto with_path = [&](Vector of_stage) {
+    vectors.for_each(
+        [&](Index i) { of_stage[i] = by_components(balance_.free[i], of_stage[i]) + path[i]; });
+    return of_stage;
+  };
+  if (!newton_.contact().empty()) add_contact(u2, with_path(v2), rest, support_work_);
   // The start extrapolates the velocity and acceleration of the first stage over the rest of the
   // step.
   Vector from = vectors.make();
@@ -168,10 +171,10 @@ void ImplicitStep::take_both_stages(State& state) {
   });
   backend_.set_history_interval(dt);
   Vector force = take_stage(end, s, from, moving, u2, v2);
-  add_contact(u2, v2, path, s, support_work_);
+  v2 = with_path(std::move(v2));
+  add_contact(u2, v2, s, support_work_);
   end_contact_ = no_step_sums(model_);
-  add_contact(u2, v2, path, 1, end_contact_);
-  vectors.for_each([&](Index i) { v2[i] = by_components(balance_.free[i], v2[i]) + path[i]; });
+  add_contact(u2, v2, 1, end_contact_);
   vectors.refresh_ghosts(u2);
   backend_.put_displacements(u2);
   backend_.commit_history();

@@ -59,10 +59,9 @@ class ImplicitStep {
   void take_both_stages(State& state);
   /// Adds the work of supports at an instant.
   void add_support_work(const SupportInstant& now);
-  /// Adds what contact does over a time [s] at the end of a stage. @param v along free axes, and
-  /// `path` along prescribed ones [m/s]
-  void add_contact(const Vector& u, const Vector& v, const Vector& path, double time,
-                   StepSums& sums) const;
+  /// Adds the impulses and the work of contact over a time [s], with the forces at the end of a
+  /// stage. @param v velocities there, of supports, too [m/s]
+  void add_contact(const Vector& u, const Vector& v, double time, StepSums& sums) const;
   /// The mean velocities of supports over a step, zero along free axes [m/s].
   Vector path_velocities(std::int64_t step, double dt) const;
 

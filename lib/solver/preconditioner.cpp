@@ -26,7 +26,7 @@ std::vector<Box> boxes_of_bodies(const Model& model) {
   }
   if (!model.share) return boxes;
   const Communicator& ranks = *model.share->communicator;
-  const auto all = exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), boxes));
+  const auto all = allgathered(ranks, boxes);
   for (const std::vector<Box>& some : all) {
     for (std::size_t b = 0; b < boxes.size(); ++b) {
       if (some[b].low.x > some[b].high.x) continue;  // that rank has none of its phyxels

@@ -55,7 +55,7 @@ class RigidBodies {
   /// Lets what obstacles have done to phyxels since the last call act back. Of a share: collective.
   /// @param sums of all obstacles and steps so far, of this rank (`ContactTerms`)
   void act_back(std::span<const ExactSum> sums);
-  /// Adds what bodies have done to held points to such sums of all obstacles.
+  /// Adds the impulses of free bodies on held points to sums of all obstacles (`ContactTerms`).
   StepSums with_held_points(StepSums sums) const;
   /// The impulses on held points of the last `begin_step`.
   const std::vector<HeldImpulse>& on_held_points() const { return contacts_.on_held(); }

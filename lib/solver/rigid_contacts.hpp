@@ -16,11 +16,11 @@ RigidState drifted(const RigidMass& mass, const RigidState& state, double dt);
 /// The kinetic energy of a free body [J].
 double kinetic_energy(const RigidMass& mass, const RigidState& state);
 
-/// What a free body does to a held point in a step. Its support bears that.
+/// The impulse of a free body on a held point in a step, which the point's support bears.
 struct HeldImpulse {
   Index id = 0;              ///< Of the point.
   std::size_t obstacle = 0;  ///< Number of the free body among the obstacles.
-  ContactTerms terms;        ///< Sums of the obstacle, which the impulse on the point is part of.
+  ContactTerms terms;        ///< Additions to the obstacle's sums.
 };
 
 /// Finds the places where free bodies touch, and the impulses that keep them apart, with Coulomb's

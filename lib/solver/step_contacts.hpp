@@ -130,7 +130,7 @@ class StepContacts {
   void keep_out(IsMeant&& is_meant, Get&& get, Set&& set) {
     keep_out(is_meant, get, set, [](Index, const ContactTerms&) {});
   }
-  /// The same. @param note is told what an obstacle does to a phyxel
+  /// The same, with the terms of each touch. @param note called as note(i, terms) for phyxel i
   template <class IsMeant, class Get, class Set, class Note>
   void keep_out(IsMeant&& is_meant, Get&& get, Set&& set, Note&& note) {
     if (model_.obstacles.empty()) return;
@@ -150,7 +150,7 @@ class StepContacts {
   void end_step() { rigid_.act_back(sums_); }
   /// The sums so far, obstacle by obstacle (`ContactTerms`).
   StepSums sums() const { return rigid_.with_held_points(sums_); }
-  /// What free bodies do to held points in the present step.
+  /// The impulses of free bodies on held points in the present step.
   const std::vector<HeldImpulse>& on_held_points() const { return rigid_.on_held_points(); }
   /// Bytes of its arrays.
   std::size_t bytes() const {

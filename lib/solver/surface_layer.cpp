@@ -85,8 +85,7 @@ SurfaceLayer::SurfaceLayer(const Model& model) : model_(model) {
     keep_smaller(ranges_[bodies_[k]], sites_[k].range);
   if (model.share) {
     const Communicator& ranks = *model.share->communicator;
-    for (const std::vector<double>& some :
-         exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), ranges_))) {
+    for (const std::vector<double>& some : allgathered(ranks, ranges_)) {
       for (std::size_t b = 0; b < ranges_.size(); ++b) keep_smaller(ranges_[b], some[b]);
     }
   }
@@ -146,8 +145,7 @@ BodyReach SurfaceLayer::reach_of(std::span<const Box> boxes, std::span<const dou
   }
   if (model_.share) {
     const Communicator& ranks = *model_.share->communicator;
-    const std::vector<std::vector<Box>> all =
-        exchanged(ranks, std::vector(static_cast<std::size_t>(ranks.size()), reach.boxes));
+    const std::vector<std::vector<Box>> all = allgathered(ranks, reach.boxes);
     for (const std::vector<Box>& some : all) {
       for (std::size_t b = 0; b < some.size(); ++b) {
         reach.boxes[b] = together(reach.boxes[b], some[b]);

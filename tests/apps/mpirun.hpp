@@ -93,6 +93,15 @@ region = "x+"
       EXPECT_TRUE(right.at(name) == content) << b << "/" << name;
     }
   }
+  /// Expects that a scene on 2 and 3 ranks gives the files in `alone`.
+  void expect_same_on_ranks(const std::string& scene) {
+    for (const int ranks : {2, 3}) {
+      const std::string name = std::to_string(ranks);
+      const test::Outcome outcome = run_on(ranks, {"run", scene, "--out", name});
+      ASSERT_EQ(outcome.code, 0) << outcome.err;
+      expect_same_files("alone", name);
+    }
+  }
 };
 
 /// Number of occurrences of `what`.

@@ -26,12 +26,7 @@ TEST_F(Mpirun, FreeBodiesMoveTheSameOnAllRanks) {
   const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_THAT(test::text_of(folder_ / "alone" / "rigid.csv"), HasSubstr(",die,box,"));
-  for (const int ranks : {2, 3}) {
-    const std::string other = "on" + std::to_string(ranks);
-    const Outcome outcome = run_on(ranks, {"run", "scene.toml", "--out", other});
-    ASSERT_EQ(outcome.code, 0) << outcome.err;
-    expect_same_files("alone", other);
-  }
+  expect_same_on_ranks("scene.toml");
 }
 
 TEST_F(Mpirun, FreeBodiesMoveTheSameOnHeldPhyxelsOfAllRanks) {
@@ -46,12 +41,7 @@ TEST_F(Mpirun, FreeBodiesMoveTheSameOnHeldPhyxelsOfAllRanks) {
         "[[body.fixed]]\nbox = [[-1, -1, 0.04], [1, 1, 1]]\n");
   const Outcome alone = run_on(0, {"run", "scene.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
-  for (const int ranks : {2, 3}) {
-    const std::string other = "on" + std::to_string(ranks);
-    const Outcome outcome = run_on(ranks, {"run", "scene.toml", "--out", other});
-    ASSERT_EQ(outcome.code, 0) << outcome.err;
-    expect_same_files("alone", other);
-  }
+  expect_same_on_ranks("scene.toml");
 }
 
 TEST_F(Mpirun, AFreeBodyInTheFloorIsRefusedOnce) {

@@ -81,12 +81,7 @@ frequency = 0.05
   const Outcome alone = run_on(0, {"run", "swing.toml", "--out", "alone"});
   ASSERT_EQ(alone.code, 0) << alone.err;
   EXPECT_THAT(alone.out, HasSubstr("because a body stiffened, doubled once"));
-  for (const int ranks : {2, 3}) {
-    const std::string name = std::to_string(ranks);
-    const Outcome outcome = run_on(ranks, {"run", "swing.toml", "--out", name});
-    ASSERT_EQ(outcome.code, 0) << outcome.err;
-    expect_same_files("alone", name);
-  }
+  expect_same_on_ranks("swing.toml");
   ASSERT_EQ(run_on(3, {"run", "swing.toml", "--out", "parts", "--until", "6"}).code, 0);
   const State middle = read_checkpoint(latest_checkpoint(folder_ / "parts").value()).state;
   const auto end = [&](const char* folder) {

@@ -79,8 +79,7 @@ std::vector<ContactReading> find_contacts(const Model& model, Backend& backend,
 /// not called where no pair can be too fast
 /// @param rigid states of the free bodies
 /// @throws DivergedError naming the pair, its speeds, and the largest step allowed; or the free
-/// body
-///   whose state is not finite
+/// body whose state is not finite
 void check_contact_speeds(const Model& model, const Solver& solver, double largest_speed,
                           const std::function<std::vector<double>()>& speeds_of_bodies,
                           std::span<const RigidState> rigid);

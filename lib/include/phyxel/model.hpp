@@ -295,8 +295,8 @@ struct Model {
   std::vector<Load> loads;
   std::vector<Obstacle> obstacles;
   ContactLayer contact;
-  /// The points that stop free rigid bodies as nothing else does, by ascending ids; of a share
-  /// those of all ranks. None in models without such bodies.
+  /// The points of surfaces at which supports stop free rigid bodies, by ascending ids; of a share,
+  /// the points of all ranks. Empty in models without free rigid bodies.
   std::vector<HeldPoint> held_points;
   BodyContact body_contact;
   std::vector<Following> following;  ///< Of loads that follow the surface, in their order.

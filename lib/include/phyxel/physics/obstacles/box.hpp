@@ -31,8 +31,8 @@ struct BoxObstacle {
         size_x * size_y * size_z,
         {size_x * size_x / 12, size_y * size_y / 12, size_z * size_z / 12});
   }
-  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
-  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
+  /// Calls each(x, radius, core) for the balls at x by which it touches other rigid bodies: they
+  /// reach its surface where it sticks out; `core` is the place nearest to x on its middle.
   template <class Each>
   void for_each_tip(Each&& each) const {
     // Parts of edges are no longer than half of the thickness: what crosses an edge meets some.

@@ -35,8 +35,8 @@ struct CapsuleObstacle {
     const double volume = middle + ends;
     return SolidMoments::about_origin(volume, {across / volume, across / volume, along / volume});
   }
-  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
-  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
+  /// Calls each(x, radius, core) for the balls at x by which it touches other rigid bodies: they
+  /// reach its surface where it sticks out; `core` is the place nearest to x on its middle.
   template <class Each>
   void for_each_tip(Each&& each) const {
     constexpr int parts = 16;

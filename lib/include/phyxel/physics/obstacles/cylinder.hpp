@@ -32,8 +32,8 @@ struct CylinderObstacle {
     return SolidMoments::about_origin(std::numbers::pi * radius * radius * length,
                                       {across, across, length * length / 12});
   }
-  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
-  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
+  /// Calls each(x, radius, core) for the balls at x by which it touches other rigid bodies: they
+  /// reach its surface where it sticks out; `core` is the place nearest to x on its middle.
   template <class Each>
   void for_each_tip(Each&& each) const {
     constexpr int around = 96, parts = 4;  // rolls as smoothly as a polygon of so many sides

@@ -23,8 +23,8 @@ struct SphereObstacle {
                  square = radius * radius / 5;
     return SolidMoments::about_origin(volume, {square, square, square});
   }
-  /// Calls each(x, radius, core) for the balls by which it touches other rigid bodies: they reach
-  /// its surface where it sticks out; `core` is the place deepest inside it that is nearest.
+  /// Calls each(x, radius, core) for the balls at x by which it touches other rigid bodies: they
+  /// reach its surface where it sticks out; `core` is the place nearest to x on its middle.
   template <class Each>
   void for_each_tip(Each&& each) const {
     each(Vec3d{}, radius, Vec3d{});
