@@ -10,6 +10,7 @@
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/contacts.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/obstacles.hpp"
 #include "support/contact_scene.hpp"
 #include "support/folder.hpp"
 
@@ -160,6 +161,24 @@ TEST(RigidBodies, AreAsFastAsTheirFastestPoint) {
               1e-12);
   EXPECT_NEAR(speed("shape = 'capsule'\nradius = 0.05\nlength = 0.1\n"), 10, 1e-12);
   EXPECT_NEAR(speed("shape = 'sphere'\nradius = 0.05\n"), 5, 1e-12);
+}
+
+/// Tips are on the surface of a shape, or balls that reach it, and cores on its middle.
+TEST(RigidBodies, TouchByTipsOfTheirSurface) {
+  const auto expect_tips = [](const auto& shape, double depth) {
+    int count = 0;
+    shape.for_each_tip([&](Vec3d x, double radius, Vec3d core) {
+      EXPECT_NEAR(shape.gap(x).distance, -radius, 1e-15);
+      EXPECT_NEAR(shape.gap(core).distance, -depth, 1e-15);
+      ++count;
+    });
+    EXPECT_GT(count, 0);
+  };
+  expect_tips(BoxObstacle{0.6, 0.03, 0.04}, 0.015);
+  expect_tips(BoxObstacle{0.4, 0.4, 0.02}, 0.01);
+  expect_tips(CylinderObstacle{0.01, 0.4}, 0.01);
+  expect_tips(CapsuleObstacle{0.01, 0.4}, 0.01);
+  expect_tips(SphereObstacle{0.1}, 0.1);
 }
 
 /// Long sticks fall onto another one that crosses them, off its middle: without restitution, an
