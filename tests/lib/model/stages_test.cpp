@@ -18,6 +18,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
+using ::testing::IsSupersetOf;
 
 /// A cube as a mesh, with closed gradients: every stage that one rank has.
 const char* const cube =
@@ -74,16 +75,18 @@ TEST_F(Stages, EachIsToldFromItsBeginningToItsEnd) {
                           "volumes of phyxels", "distances between phyxels", "neighbours",
                           "phyxels near the surface", "moments", "phyxels near the surface",
                           "closed gradients", "largest time step"));
-  std::size_t between = 0;
+  std::vector<std::string> telling;  // how far they are, and not only that they begin and end
   for (std::size_t s = 0; s < heard.names.size(); ++s) {
     const std::vector<double>& shares = heard.shares[s];
     EXPECT_EQ(shares.front(), 0) << heard.names[s];
     EXPECT_EQ(shares.back(), 1) << heard.names[s];
     for (std::size_t k = 1; k < shares.size(); ++k) EXPECT_GT(shares[k], shares[k - 1]);
-    between += shares.size() > 2;
+    if (shares.size() > 2) telling.push_back(heard.names[s]);
   }
-  // What takes long tells how far it is: the surface, evening out, volumes, gradients, the step.
-  EXPECT_GE(between, 5u);
+  // Other stages tell it as well if the observer's thread takes part in their loops, which on many
+  // threads it need not do.
+  EXPECT_THAT(telling, IsSupersetOf({"evening out distances", "closed gradients",
+                                     "largest time step"}));
 
   const std::size_t before = heard.names.size();
   set_up(scene());  // nobody listens any more
