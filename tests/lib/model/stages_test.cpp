@@ -85,8 +85,8 @@ TEST_F(Stages, EachIsToldFromItsBeginningToItsEnd) {
   }
   // Other stages tell it as well if the observer's thread takes part in their loops, which on many
   // threads it need not do.
-  EXPECT_THAT(telling, IsSupersetOf({"evening out distances", "closed gradients",
-                                     "largest time step"}));
+  EXPECT_THAT(telling,
+              IsSupersetOf({"evening out distances", "closed gradients", "largest time step"}));
 
   const std::size_t before = heard.names.size();
   set_up(scene());  // nobody listens any more
