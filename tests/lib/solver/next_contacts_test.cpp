@@ -62,12 +62,12 @@ TEST_P(NextContacts, AreWhatTheNextStepDoes) {
     const std::vector<ContactReading> then = way.contacts();
     for (std::size_t o = 0; o < now.size(); ++o) {
       const Vec3d did = then[o].impulse - now[o].impulse, foreseen = dt * now[o].force;
-      // In float, the step rounds what the host has not rounded: momenta of phyxels of 0.1 kg at
-      // 1 m/s by 4e-9 N s each, of which some touch the ball at once, at arms of 0.1 m.
-      const double relative = rounds ? 1e-3 : 1e-9, floor = rounds ? 2e-8 : 1e-12;
-      EXPECT_LE(norm(did - foreseen), relative * norm(did) + floor) << now[o].obstacle;
+      // In float, a step rounds the momentum of each phyxel, of 0.1 kg at 1 m/s, by 4e-9 N s; the
+      // forecast does not. Several phyxels touch the ball at once, at arms of 0.1 m.
+      const double relative = rounds ? 1e-3 : 1e-9, rounding = rounds ? 2e-8 : 1e-12;
+      EXPECT_LE(norm(did - foreseen), relative * norm(did) + rounding) << now[o].obstacle;
       const Vec3d turned = then[o].angular_impulse - now[o].angular_impulse;
-      EXPECT_LE(norm(turned - dt * now[o].torque), relative * norm(turned) + 0.1 * floor);
+      EXPECT_LE(norm(turned - dt * now[o].torque), relative * norm(turned) + 0.1 * rounding);
       if (norm(did) > 0) ++(now[o].shape == "body" ? of_bodies : of_obstacles);
     }
   }
