@@ -54,7 +54,7 @@ Scene bench_scene(const std::string& terms, double factor, int bodies) {
     if (term_of(law) != terms) continue;
     body.material.law = law.name;
     for (const LawParameter& p : law.parameters) {
-      if (p.required() && is_own_parameter(p)) body.material.parameters[p.name] = p.typical;
+      if (p.required() && is_own_parameter(p)) body.material.parameters[p.name] = typical_value(p);
     }
   }
   if (terms == "volume") body.material.volume_stiffness = 1e6;

@@ -139,7 +139,7 @@ Facts scene_facts(const fs::path& file) {
     if (has_parameter(body.material.law, "young")) facts["E [Pa]"] = body.material.young;
     if (has_parameter(body.material.law, "poisson")) facts["nu"] = body.material.poisson;
     for (const auto& [name, value] : body.material.parameters) {
-      if (value.is_vector()) {
+      if (value.is_vector() || value.is_curve()) {
         facts[name] = value.text();
       } else {
         facts[name] = value.number();

@@ -20,6 +20,12 @@ constexpr bool is_linear() {
 }
 
 template <class Law>
+constexpr bool work_is_potential() {
+  if constexpr (requires { Law::work_is_potential; }) return Law::work_is_potential;
+  return true;
+}
+
+template <class Law>
 constexpr bool has_young() {
   for (const LawParameter& p : Law::parameters) {
     if (std::string_view(p.name) == young_modulus.name) return true;
@@ -40,8 +46,8 @@ constexpr std::span<const HistoryNumber> history_of_law() {
 std::vector<LawEntry> make_table() {
   std::vector<LawEntry> table;
   Laws::for_each<double>([&]<class Law>(std::type_identity<Law>) {
-    table.push_back(
-        {Law::name, Law::meaning, Law::parameters, is_linear<Law>(), history_of_law<Law>()});
+    table.push_back({Law::name, Law::meaning, Law::parameters, is_linear<Law>(),
+                     history_of_law<Law>(), work_is_potential<Law>()});
   });
   return table;
 }
@@ -63,6 +69,25 @@ bool is_allowed(const LawParameter& parameter, double value) {
                         : parameter.low <= value && value <= parameter.high;
 }
 
+/// The number of values that `constants` of a law takes of a parameter.
+std::size_t width_of(const LawParameter& p) {
+  return static_cast<std::size_t>(p.is_curve() ? 2 * p.points : p.count);
+}
+
+/// A parameter's values as the user gave them.
+std::string text_of(const LawParameter& p, std::span<const double> values) {
+  if (p.is_curve()) {
+    ParameterValue::Curve curve;
+    for (std::size_t k = 0; k < values.size(); k += 2) {
+      if (!curve.empty() && !(values[k] > curve.back()[0])) break;  // the last point, repeated
+      curve.push_back({values[k], values[k + 1]});
+    }
+    return ParameterValue(curve).text();
+  }
+  if (p.count == 3) return ParameterValue(Vec3d{values[0], values[1], values[2]}).text();
+  return ParameterValue(values[0]).text();
+}
+
 /// Refuses parameters that a law allows one by one, but not together (`unmet` in its file).
 template <class Law>
 void check_together(const std::vector<double>& values) {
@@ -71,18 +96,61 @@ void check_together(const std::vector<double>& values) {
     if (needed.empty()) return;
     std::vector<std::string> found;
     for (std::size_t k = 0; const LawParameter& p : Law::parameters) {
-      found.push_back(fmt::format(
-          "{} = {}", p.name,
-          p.count == 1 ? ParameterValue(values[k]).text()
-                       : ParameterValue(Vec3d{values[k], values[k + 1], values[k + 2]}).text()));
-      k += static_cast<std::size_t>(p.count);
+      const std::size_t width = width_of(p);
+      found.push_back(fmt::format("{} = {}", p.name, text_of(p, {values.data() + k, width})));
+      k += width;
     }
     throw InputError(fmt::format("{} found, which law \"{}\" does not allow together; allowed: {}",
                                  fmt::join(found, ", "), Law::name, needed));
   }
 }
 
-/// The parameters of a law in the order of its table, vectors component by component.
+/// The range of a parameter in words, e.g. "0 < density < 1e+18 [kg/m^3]".
+std::string range_of(const LawParameter& p, const std::string& name) {
+  const char* const less = p.open ? "<" : "<=";
+  return fmt::format("{:g} {} {} {} {:g}{}{}{}", p.low, less, name, less, p.high,
+                     *p.unit ? " [" : "", p.unit, *p.unit ? "]" : "");
+}
+
+/// Refuses a curve that has no points, too many, or points that do not ascend from 0 within the
+/// range.
+void check_curve(const LawParameter& p, const ParameterValue& value) {
+  const std::string allowed =
+      fmt::format("[[x, y], ...], 1 to {} points, x ({}) ascends from 0, {}", p.points, p.argument,
+                  range_of(p, "y"));
+  if (!value.is_curve()) {
+    throw InputError(fmt::format("{} = {} found; allowed: {}", p.name, value.text(), allowed));
+  }
+  const ParameterValue::Curve curve = value.curve();
+  if (curve.empty() || curve.size() > static_cast<std::size_t>(p.points)) {
+    throw InputError(
+        fmt::format("{}: {} points found; allowed: {}", p.name, curve.size(), allowed));
+  }
+  for (std::size_t k = 0; k < curve.size(); ++k) {
+    const auto [x, y] = curve[k];
+    const bool ascends = k == 0 ? x == 0 : x > curve[k - 1][0] && std::isfinite(x);
+    if (ascends && is_allowed(p, y)) continue;
+    throw InputError(
+        fmt::format("{}: point {} is [{:g}, {:g}]; allowed: {}", p.name, k + 1, x, y, allowed));
+  }
+}
+
+/// Refuses a value that a parameter does not allow.
+void check_value(const LawParameter& p, const ParameterValue& value) {
+  if (p.is_curve()) return check_curve(p, value);
+  if (value.is_curve() || value.is_vector() != (p.count == 3)) {
+    throw InputError(fmt::format("{} = {} found; allowed: {}", p.name, value.text(),
+                                 p.count == 3 ? "a vector [x, y, z]" : "a number"));
+  }
+  for (const double number : value.numbers()) {
+    if (is_allowed(p, number)) continue;
+    throw InputError(
+        fmt::format("{} = {} found; allowed: {}", p.name, value.text(), range_of(p, p.name)));
+  }
+}
+
+/// The parameters of a law in the order of its table, vectors component by component, curves point
+/// by point.
 std::vector<double> values_of(const LawEntry& law, const Material& material) {
   std::vector<double> values;
   for (const auto& [name, value] : material.parameters) {
@@ -105,33 +173,37 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
       value = material.young;
     } else if (name == "poisson") {
       value = material.poisson;
+    } else if (name == "density") {
+      value = material.density;
     } else if (const auto at = material.parameters.find(name); at != material.parameters.end()) {
       value = at->second;
     } else if (parameter.required()) {
       throw InputError(fmt::format("{} is missing, which law \"{}\" needs", name, law.name));
     }
-    if (value.is_vector() != (parameter.count == 3)) {
-      throw InputError(fmt::format("{} = {} found; allowed: {}", name, value.text(),
-                                   parameter.count == 3 ? "a vector [x, y, z]" : "a number"));
-    }
-    for (const double number : value.numbers()) {
-      if (is_allowed(parameter, number)) continue;
-      const char* const less = parameter.open ? "<" : "<=";
-      throw InputError(fmt::format("{} = {} found; allowed: {:g} {} {} {} {:g}{}{}{}", name,
-                                   value.text(), parameter.low, less, name, less, parameter.high,
-                                   *parameter.unit ? " [" : "", parameter.unit,
-                                   *parameter.unit ? "]" : ""));
-    }
+    check_value(parameter, value);
     values.insert(values.end(), value.numbers().begin(), value.numbers().end());
+    const std::size_t missing = width_of(parameter) - value.numbers().size();
+    for (std::size_t k = 0; k < missing; ++k) values.push_back(values[values.size() - 2]);
   }
   return values;
 }
 
 }  // namespace
 
+ParameterValue::Curve ParameterValue::curve() const {
+  Curve points;
+  for (std::size_t k = 0; k < numbers_.size(); k += 2) {
+    points.push_back({numbers_[k], numbers_[k + 1]});
+  }
+  return points;
+}
+
 std::string ParameterValue::text() const {
-  return is_vector() ? fmt::format("[{:g}, {:g}, {:g}]", numbers_[0], numbers_[1], numbers_[2])
-                     : fmt::format("{:g}", numbers_[0]);
+  if (is_vector()) return fmt::format("[{:g}]", fmt::join(numbers_, ", "));
+  if (!is_curve()) return fmt::format("{:g}", number());
+  std::vector<std::string> points;
+  for (const auto& [x, y] : curve()) points.push_back(fmt::format("[{:g}, {:g}]", x, y));
+  return fmt::format("[{}]", fmt::join(points, ", "));
 }
 
 std::span<const LawEntry> law_table() {
@@ -141,7 +213,15 @@ std::span<const LawEntry> law_table() {
 
 bool is_own_parameter(const LawParameter& parameter) {
   return parameter.name != std::string_view(young_modulus.name) &&
-         parameter.name != std::string_view(poisson_ratio.name);
+         parameter.name != std::string_view(poisson_ratio.name) &&
+         parameter.name != std::string_view(material_density.name);
+}
+
+ParameterValue typical_value(const LawParameter& parameter, double scale) {
+  if (!parameter.is_curve()) return scale * parameter.typical;
+  ParameterValue::Curve curve;
+  for (const auto& [x, y] : parameter.typical_curve) curve.push_back({x, scale * y});
+  return curve;
 }
 
 bool has_parameter(std::string_view law, std::string_view parameter) {

@@ -24,6 +24,7 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
     const bool is_it = material.law == entry.name;
     for (const LawParameter& parameter : entry.parameters) {
       const std::string name = parameter.name;
+      if (name == material_density.name) continue;  // that of the material
       if (!is_it) {
         if (!table.has(parameter.name) || has_parameter(material.law, name)) continue;
         table.refuse(parameter.name,
@@ -40,7 +41,11 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
         const auto bodys = material.parameters.find(name);
         if (bodys != material.parameters.end()) parameters.insert(*bodys);
         if (!table.has(parameter.name)) continue;
-        if (parameter.count == 3) {
+        if (parameter.is_curve()) {
+          ParameterValue::Curve curve;
+          table.read(parameter.name, curve);
+          parameters[name] = curve;
+        } else if (parameter.count == 3) {
           Vec3d vector;
           table.read(parameter.name, vector);
           parameters[name] = vector;

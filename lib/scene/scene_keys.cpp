@@ -47,6 +47,16 @@ std::string field_meanings() {
   return all + ". The surface has them, too, but for velocity, mass and volume.";
 }
 
+/// The laws that have a parameter: "j2", or "j2" or "clay".
+std::string laws_with(std::string_view parameter) {
+  std::string names;
+  for (const LawEntry& law : law_table()) {
+    if (!has_parameter(law.name, parameter)) continue;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : " or ", law.name);
+  }
+  return names;
+}
+
 /// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share
 /// a parameter share its key.
 std::vector<SceneKey> law_keys(const std::string& section) {
@@ -55,7 +65,7 @@ std::vector<SceneKey> law_keys(const std::string& section) {
     for (const LawParameter& p : law.parameters) {
       const auto is_it = [&](const SceneKey& key) { return key.name == p.name; };
       if (!is_own_parameter(p) || std::any_of(keys.begin(), keys.end(), is_it)) continue;
-      std::string otherwise = fmt::format("law \"{}\" needs it", law.name);
+      std::string otherwise = fmt::format("law {} needs it", laws_with(p.name));
       if (section != "body.material") {
         otherwise = "the body's";
       } else if (p.count == 3) {
@@ -64,11 +74,18 @@ std::vector<SceneKey> law_keys(const std::string& section) {
       } else if (!p.required()) {
         otherwise = fmt::format("{:g}", p.fallback);
       }
-      keys.push_back({.section = section, .name = p.name,
-                      .type = p.count == 3 ? KeyType::vector : KeyType::number, .unit = p.unit,
-                      .otherwise = otherwise,
-                      .range = {p.low, p.high, p.open},
-                      .meaning = fmt::format("With law = \"{}\": {}", law.name, p.meaning)});
+      SceneKey key{.section = section, .name = p.name,
+                   .type = p.count == 3 ? KeyType::vector : KeyType::number, .unit = p.unit,
+                   .otherwise = otherwise,
+                   .range = {p.low, p.high, p.open},
+                   .meaning = fmt::format("With law = {}: {}", laws_with(p.name), p.meaning)};
+      if (p.is_curve()) {
+        key.type = KeyType::curve;
+        key.curve = {.x = "x", .y = "y", .x_words = fmt::format("x ({}) ascends from 0", p.argument),
+                     .x_range = {0, 1e18, false}, .from_zero = true,
+                     .most_points = static_cast<std::size_t>(p.points)};
+      }
+      keys.push_back(std::move(key));
     }
   }
   return keys;

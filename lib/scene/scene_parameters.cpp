@@ -91,6 +91,11 @@ std::string in_words(const char*, const char*, const std::vector<LoadCurve::Poin
   for (const auto [time, factor] : v) points.push_back(fmt::format("[{}, {}]", time, factor));
   return fmt::format("[{}]", fmt::join(points, ", "));
 }
+std::string in_words(const char*, const char*, const ParameterValue::Curve& v) {
+  std::vector<std::string> points;
+  for (const auto& [x, y] : v) points.push_back(fmt::format("[{}, {}]", x, y));
+  return fmt::format("[{}]", fmt::join(points, ", "));
+}
 std::string in_words(const char* section, const char* name, Word word) {
   const SceneKey* key = find_key(section, name);
   return key && word.index < key->words.size() ? on_one_line(key->words[word.index])

@@ -95,7 +95,9 @@ void visit_material(const char* section, const BodyRequest& body, const Material
   visit(section, "density", m.density);
   visit(section, "law", law);
   for (const auto& [name, value] : m.parameters) {
-    if (value.is_vector()) {
+    if (value.is_curve()) {
+      visit(section, name.c_str(), value.curve());
+    } else if (value.is_vector()) {
       visit(section, name.c_str(), value.vector());
     } else {
       visit(section, name.c_str(), value.number());
@@ -293,7 +295,7 @@ void visit_pair(const ContactPairRequest& pair, Visit&& visit) {
 }  // namespace detail
 
 /// Calls `visit(owner, section, key, value)` for every value of a scene that is set. Values are
-/// numbers, `Vec3d`, text, lists or a `Word`.
+/// numbers, `Vec3d`, text, lists, curves or a `Word`.
 template <class Visit>
 void for_each_parameter(const Scene& scene, Visit&& visit) {
   const auto of = [&](ParameterOwner owner) {

@@ -45,8 +45,10 @@ std::string plain_words(const SceneKey& key) {
     case KeyType::box:
       return "[[x, y, z], [x, y, z]]";
     case KeyType::curve:
-      return fmt::format("[[t, f], ...], 1 to {} points, {} [s], times ascend",
-                         LoadCurve::most_points, curve_times.in_words("t"));
+      return fmt::format(
+          "[[{}, {}], ...], 1 to {} points, {}", key.curve.x, key.curve.y, key.curve.most_points,
+          key.curve.x_words.empty() ? key.curve.x_range.in_words(key.curve.x) + " [s], times ascend"
+                                    : key.curve.x_words);
     case KeyType::table:
       return header_of(key);
     case KeyType::tables:
@@ -75,11 +77,11 @@ std::string Range::in_words(const std::string& name) const {
 }
 
 std::optional<std::size_t> wrong_point(std::span<const LoadCurve::Point> points,
-                                       const Range& factors) {
+                                       const SceneKey& key) {
   for (std::size_t k = 0; k < points.size(); ++k) {
-    const bool good = curve_times.contains(points[k].time) && factors.contains(points[k].factor) &&
-                      (k == 0 || points[k].time > points[k - 1].time);
-    if (!good) return k;
+    const auto [x, y] = points[k];
+    const bool ascends = k == 0 ? !key.curve.from_zero || x == 0 : x > points[k - 1].time;
+    if (!ascends || !key.curve.x_range.contains(x) || !key.range.contains(y)) return k;
   }
   return std::nullopt;
 }
@@ -103,7 +105,7 @@ std::vector<const SceneKey*> keys_of(const std::string& section) {
 std::string allowed_words(const SceneKey& key) {
   const bool several =
       key.type == KeyType::vector || key.type == KeyType::counts || key.type == KeyType::indices;
-  const std::string one = key.type == KeyType::curve ? "f" : key.name;
+  const std::string one = key.type == KeyType::curve ? key.curve.y : key.name;
   const std::string range = key.range.in_words(several ? "each" : one);
   std::string words = plain_words(key);
   if (!range.empty()) words += ", " + range;

@@ -27,7 +27,7 @@ enum class KeyType {
   counts,   ///< [x, y, z], integers.
   indices,  ///< A list of integers, at least one.
   box,      ///< [[x, y, z], [x, y, z]]
-  curve,    ///< [[time, factor], ...]; `range` is that of the factors.
+  curve,    ///< [[x, y], ...], of which `curve` says more; `range` is that of y.
   table,
   tables,  ///< [[...]], one or more.
 };
@@ -42,6 +42,15 @@ struct Range {
   std::string in_words(const std::string& name) const;
 };
 
+/// The form of a key that is a curve [[x, y], ...]; by default a factor by time.
+struct CurveForm {
+  std::string x = "t", y = "f";  ///< Their names in messages.
+  std::string x_words{};         ///< How x go, where their range is not all: "x ascends from 0".
+  Range x_range{0, 1e9, false};
+  bool from_zero = false;  ///< True if the first x has to be 0.
+  std::size_t most_points = LoadCurve::most_points;
+};
+
 struct SceneKey {
   std::string section{};  ///< "body.material"; "" at the top of the file.
   std::string name{};     ///< "young"
@@ -54,6 +63,7 @@ struct SceneKey {
   std::vector<std::string>
       words{};  ///< Of a choice; in the order of the enumeration, if there is one.
   std::string meaning{};
+  CurveForm curve{};
 };
 
 struct SceneSection {
@@ -63,13 +73,10 @@ struct SceneSection {
   std::string meaning;
 };
 
-/// Allowed times of the points of a curve [s].
-inline constexpr Range curve_times{0, 1e9, false};
-
-/// Returns the number of the first point of a curve that may not stand there: times ascend strictly
-/// within `curve_times`, factors lie in a range. Unset if all may.
+/// Returns the number of the first point of a curve that may not stand there: x ascend strictly
+/// within the range of the key's curve, y lie in that of the key. Unset if all may.
 std::optional<std::size_t> wrong_point(std::span<const LoadCurve::Point> points,
-                                       const Range& factors);
+                                       const SceneKey& key);
 
 /// All sections and all keys, in the order of the documentation.
 std::span<const SceneSection> scene_sections();

@@ -89,14 +89,14 @@ std::vector<LoadCurve::Point> as_curve(const toml::array& list) {
   return points;
 }
 
-const toml::node* offender_in_curve(const toml::node& node, const Range& factors) {
+const toml::node* offender_in_curve(const toml::node& node, const SceneKey& key) {
   const toml::node* found = offender_in(node, 0, [](const toml::node& point) {
     return !offender_in(point, 2, [](const toml::node& x) { return x.is_number(); });
   });
   if (found) return found;
   const toml::array& list = *node.as_array();
-  if (list.size() > LoadCurve::most_points) return &node;
-  const auto wrong = wrong_point(as_curve(list), factors);
+  if (list.size() > key.curve.most_points) return &node;
+  const auto wrong = wrong_point(as_curve(list), key);
   return wrong ? list.get(*wrong) : nullptr;
 }
 
@@ -129,7 +129,7 @@ const toml::node* offender(const toml::node& node, const SceneKey& key) {
     case KeyType::box:
       return offender_in_box(node, key.range);
     case KeyType::curve:
-      return offender_in_curve(node, key.range);
+      return offender_in_curve(node, key);
     case KeyType::table:
       return unless(node.is_table());
     case KeyType::tables:
@@ -354,6 +354,12 @@ void SceneTable::read(const char* name, Selection::Box& value) const {
 
 void SceneTable::read(const char* name, std::vector<LoadCurve::Point>& value) const {
   if (has(name)) value = as_curve(*table_->get(name)->as_array());
+}
+
+void SceneTable::read(const char* name, ParameterValue::Curve& value) const {
+  if (!has(name)) return;
+  value.clear();
+  for (const auto [x, y] : as_curve(*table_->get(name)->as_array())) value.push_back({x, y});
 }
 
 std::string SceneTable::where() const { return place(position_); }

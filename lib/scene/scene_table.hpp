@@ -40,6 +40,7 @@ class SceneTable {
   void read(const char* name, std::vector<std::string>& value) const;
   void read(const char* name, Selection::Box& value) const;
   void read(const char* name, std::vector<LoadCurve::Point>& value) const;
+  void read(const char* name, ParameterValue::Curve& value) const;
   template <class T>
   void read(const char* name, std::optional<T>& value) const {
     if (has(name)) read(name, value.emplace());

@@ -63,7 +63,7 @@ void check_curve(const ParameterOwner& owner, const SceneKey& key,
     throw InputError(fmt::format("{}: {} points found; allowed: {}", place_of(owner, key),
                                  points.size(), allowed));
   }
-  const auto wrong = wrong_point(points, key.range);
+  const auto wrong = wrong_point(points, key);
   if (!wrong) return;
   const auto [time, factor] = points[*wrong];
   throw InputError(fmt::format("{}: point {} is [{}, {}]; allowed: {}", place_of(owner, key),

@@ -8,6 +8,7 @@
 
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/law_table.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/host_threads.hpp"
 
@@ -59,7 +60,14 @@ Newton::Newton(const Model& model, Backend& backend, int most_steps)
       following_(model),
       contact_(model),
       preconditioner_(model, vectors_),
-      difference_(1e-7 * vectors_.smallest_support()) {}
+      difference_(1e-7 * vectors_.smallest_support()) {
+  is_nearly_potential_ = !following_.empty();
+  for (const Part& part : model.parts) {  // of the same materials on all ranks
+    if (part.material.custom_law) continue;
+    const LawEntry& law = law_table()[chosen_law(part.material).index];
+    is_nearly_potential_ = is_nearly_potential_ || !law.work_is_potential;
+  }
+}
 
 /// The reason to give a search up, or nothing. @param exhausted number of steps in a row whose
 /// linear equations stayed unsolved
@@ -214,11 +222,12 @@ Newton::LineSearch Newton::search_line(const Start& start, const Vector& u, cons
     const double plain = potential(balance, next);
     const double now = plain + contact_.energy(balance.obstacles, next);
     // Energy may rise while prescribed phyxels move; a rise by rounding does not count. Pressure
-    // that follows the surface has an energy only nearly: there, smaller residuals do as well.
+    // that follows the surface has an energy only nearly, and so do laws whose flow depends on its
+    // rate: there, smaller residuals do as well.
     const double rise = now - start.energy, rounding = 1e-10 * std::abs(start.energy);
     const bool falls =
         rise <= rounding ||
-        (!following_.empty() &&
+        (is_nearly_potential_ &&
          residual(balance, next, with_contact(balance, next, force)) < start.residual);
     if (std::isfinite(now) && (start.moves || falls || attempt == most_cuts)) {
       plain_energy = plain;

@@ -148,6 +148,8 @@ class Newton {
   int most_steps_;
   OwnedVectors vectors_;
   FollowingLoads following_;
+  /// True if forces have an energy only nearly: line searches look at residuals, too.
+  bool is_nearly_potential_ = false;
   ContactPenalty contact_;
   Preconditioner preconditioner_;
   double difference_;              ///< Largest displacement in differences of forces [m].

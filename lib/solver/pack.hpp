@@ -37,6 +37,12 @@ struct Pack {
   PHYXEL_HD friend Pack where_larger(Pack a, Pack b, Pack yes, Pack no) {
     return Pack(a.lanes > b.lanes ? yes.lanes : no.lanes);
   }
+  /// True if a lane is positive.
+  PHYXEL_HD friend bool any_positive(Pack a) {
+    bool any = false;
+    for (int l = 0; l < W; ++l) any |= a.lanes[l] > T(0);
+    return any;
+  }
   PHYXEL_HD friend Pack sqrt(Pack a) {
     for (int l = 0; l < W; ++l) a.lanes[l] = std::sqrt(a.lanes[l]);
     return a;

@@ -25,7 +25,7 @@ inline Material rubber_of(const std::string& law) {
     for (const LawParameter& p : entry.parameters) {
       if (!p.required() || !is_own_parameter(p)) continue;
       const bool is_modulus = p.unit == std::string("Pa");
-      material.parameters[p.name] = is_modulus ? 0.1 * p.typical : p.typical;
+      material.parameters[p.name] = typical_value(p, is_modulus ? 0.1 : 1);
     }
   }
   return material;

@@ -19,6 +19,10 @@ struct LawEntry {
   std::span<const LawParameter> parameters;  ///< Parameters in the order of `constants`.
   bool is_linear;                            ///< True if the law does not stiffen.
   std::span<const HistoryNumber> history;    ///< History numbers of a phyxel.
+  /// True if stored energy and plastic work after a step are a potential of the stress after it, as
+  /// where the flow stress depends on the plastic strain alone: its minimum is then the balance of
+  /// an implicit step.
+  bool work_is_potential;
 };
 
 /// The law of materials that name none: it wins on first scenes, speed and accuracy (docs/laws.md).
@@ -28,8 +32,13 @@ inline constexpr const char* usual_law = NeoHookean<double>::name;
 /// All laws, in the order of `Laws`.
 std::span<const LawEntry> law_table();
 
-/// True for a parameter in `Material::parameters`: those other than `young` and `poisson`.
+/// True for a parameter in `Material::parameters`: those other than `young`, `poisson` and
+/// `density`.
 bool is_own_parameter(const LawParameter& parameter);
+
+/// The value of a required parameter in measurements of speed and in tests. @param scale factor of
+/// the number, or of each y of a curve
+ParameterValue typical_value(const LawParameter& parameter, double scale = 1);
 
 /// True if there is a law of this name and it has this parameter; "" is `usual_law`.
 bool has_parameter(std::string_view law, std::string_view parameter);

@@ -7,6 +7,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "phyxel/physics/hooke.hpp"
 #include "phyxel/types.hpp"
@@ -15,31 +16,43 @@ namespace phyxel {
 
 class CustomLaw;
 
-/// The value of a law's parameter: a number, or the three of a vector.
+/// The value of a law's parameter: a number, the three of a vector, or the points of a curve.
 class ParameterValue {
  public:
-  ParameterValue() = default;
+  /// The points [x, y] of a curve.
+  using Curve = std::vector<std::array<double, 2>>;
+
+  ParameterValue() : ParameterValue(0.0) {}
   /// A number converts to a value.
-  ParameterValue(double number) : numbers_{number, 0, 0} {}  // NOLINT: implicit on purpose
+  ParameterValue(double number) : numbers_{number} {}  // NOLINT: implicit on purpose
   /// A vector converts to a value.
   ParameterValue(Vec3d vector)
-      : numbers_{vector.x, vector.y, vector.z}, count_(3) {}  // NOLINT: implicit on purpose
+      : numbers_{vector.x, vector.y, vector.z}, kind_(Kind::vector) {}  // NOLINT: likewise
+  /// A curve converts to a value.
+  ParameterValue(const Curve& curve) : numbers_(), kind_(Kind::curve) {  // NOLINT: likewise
+    for (const auto& point : curve) numbers_.insert(numbers_.end(), point.begin(), point.end());
+  }
 
-  /// Its numbers, shape [1] or [3].
-  std::span<const double> numbers() const { return {numbers_.data(), count_}; }
+  /// Its numbers, shape [1], [3] or [2 points], point by point.
+  std::span<const double> numbers() const { return numbers_; }
   /// The number, of a parameter that is one; of a vector its first component.
-  double number() const { return numbers_[0]; }
+  double number() const { return numbers_.empty() ? 0 : numbers_[0]; }
   /// The vector, of a parameter that is one.
   Vec3d vector() const { return {numbers_[0], numbers_[1], numbers_[2]}; }
+  /// The curve, of a parameter that is one.
+  Curve curve() const;
   /// The value has three numbers.
-  bool is_vector() const { return count_ == 3; }
-  /// "0.3" or "[1, 0, 0]".
+  bool is_vector() const { return kind_ == Kind::vector; }
+  /// The value is a curve.
+  bool is_curve() const { return kind_ == Kind::curve; }
+  /// "0.3", "[1, 0, 0]" or "[[0, 1], [2, 3]]".
   std::string text() const;
   bool operator==(const ParameterValue&) const = default;
 
  private:
-  std::array<double, 3> numbers_{};
-  std::size_t count_ = 1;
+  enum class Kind { number, vector, curve };
+  std::vector<double> numbers_;
+  Kind kind_ = Kind::number;
 };
 
 /// The material of a body: a law, its parameters, and terms beside it.

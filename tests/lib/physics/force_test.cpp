@@ -341,8 +341,9 @@ TEST(Force, LawsButHookesResistUntilTheBodyIsInsideOut) {
       resists = resists && push < before;
       before = push;
     }
-    const bool in_green_strain =
-        std::is_same_v<Law, StVenantKirchhoff<double>> || std::is_same_v<Law, Orthotropic<double>>;
+    const bool in_green_strain = std::is_same_v<Law, StVenantKirchhoff<double>> ||
+                                 std::is_same_v<Law, Orthotropic<double>> ||
+                                 std::is_same_v<Law, Clay<double>>;
     EXPECT_EQ(resists, !in_green_strain) << Law::name;
   });
 }

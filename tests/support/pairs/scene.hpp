@@ -24,7 +24,7 @@ inline Material material_of_law(const std::string& name) {
     for (const LawParameter& p : entry.parameters) {
       const auto own = material.parameters.find(p.name);
       if (own != material.parameters.end() && p.unit == std::string("Pa")) {
-        own->second = 0.1 * own->second.number();
+        own->second = typical_value(p, 0.01);
       }
     }
     if (has_parameter(name, "hardening")) material.parameters["hardening"] = 1e4;

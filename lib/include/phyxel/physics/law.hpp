@@ -27,6 +27,8 @@
 ///   static constexpr bool is_linear = true;         its stiffness never changes
 ///   static double hourglass_modulus(std::span<const double> values);
 ///   the modulus [Pa] that scales hourglass control; without it, the parameter `young_modulus`
+///   static constexpr bool work_is_potential = false;
+///   stored energy and plastic work after a step are not a potential of the stress after it
 ///   static const char* unmet(std::span<const double> values);
 ///   the condition that parameters, each within its range, violate together, as the error message
 ///   states it, e.g. "a > 2 b"; "" if there is none
@@ -67,7 +69,15 @@ struct LawParameter {
   /// `typical`.
   int count = 1;
   double vector_fallback[3] = {0, 0, 0};
+  /// The largest number of points of a curve [[x, y], ...]; 0: the parameter is no curve. Its x
+  /// ascend from 0, and each y is within the range. `constants` takes this number of points x, y
+  /// one after the other, the last point repeated.
+  int points = 0;
+  const char* argument = "";              ///< What x is, in the reference, e.g. "plastic strain".
+  double typical_curve[2][2] = {{0, 0}};  ///< Takes the place of `typical`.
 
+  /// True for a curve.
+  constexpr bool is_curve() const { return points > 0; }
   /// True if the user has to give it.
   constexpr bool required() const { return count == 1 && fallback != fallback; }
 };
@@ -86,6 +96,10 @@ inline constexpr LawParameter young_modulus{
 inline constexpr LawParameter poisson_ratio{
     "poisson", "",   -1,
     0.5,       true, "Poisson's ratio; 0.3 for most solids, near 0.5 for what keeps its volume."};
+/// The material's density, a parameter of laws that heat: they take it with their own parameters,
+/// but a material has it beside its law.
+inline constexpr LawParameter material_density{
+    "density", "kg/m^3", 0, 1e18, true, "Density, that of the material."};
 
 /// The number of constants of a law.
 template <class Law, class Real>

@@ -2,9 +2,12 @@
 /// checkpoints and in the reference of scenes.
 #pragma once
 
+#include "phyxel/physics/laws/clay.hpp"
 #include "phyxel/physics/laws/corotated.hpp"
 #include "phyxel/physics/laws/hencky.hpp"
 #include "phyxel/physics/laws/j2.hpp"
+#include "phyxel/physics/laws/j2_curve.hpp"
+#include "phyxel/physics/laws/johnson_cook.hpp"
 #include "phyxel/physics/laws/mooney_rivlin.hpp"
 #include "phyxel/physics/laws/neo_hookean.hpp"
 #include "phyxel/physics/laws/orthotropic.hpp"
@@ -17,7 +20,7 @@ namespace phyxel {
 
 /// Every law, in the order of the reference of scenes.
 using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
-                     Orthotropic, J2>;
+                     Orthotropic, J2, J2Curve, JohnsonCook, Clay>;
 
 /// An upper bound of the factor by which viscosity exceeds that at rest: it acts on the rate of
 /// Green's strain, and so grows as the stretch squared.
