@@ -3,7 +3,7 @@
 #
 #   scripts/measure_gpu.sh [folder [part...]]   after cmake --preset cuda && cmake --build --preset cuda
 #
-# Parts: sizes, terms, small and setup, which are the default; meshes (runs of MESH, a file, by MESH_PHYXELS phyxels with
+# Parts: sizes, terms, contact, small and setup, which are the default; meshes (runs of MESH, a file, by MESH_PHYXELS phyxels with
 # MESH_CLOSURE); for docs/scaling.md on hosts with several GPUs, ranks (2, 4, 8 GPUs) and large (LARGE phyxels on all GPUs;
 # a billion by default, with 4 or more).
 # PHYXEL is the program (default: build/cuda/bin/phyxel), PHYXEL_STUDIES phyxel_studies (default: beside it).
@@ -16,7 +16,7 @@ program=${PHYXEL:-build/cuda/bin/phyxel}
 studies=${PHYXEL_STUDIES:-$(dirname "$program")/phyxel_studies}
 mkdir -p "$out"
 shift || true
-parts=" ${*:-sizes terms small setup} "
+parts=" ${*:-sizes terms contact small setup} "
 has() { [[ $parts == *" $1 "* ]]; }
 # measured <table> <program> <arguments>...
 measured() {
@@ -47,6 +47,11 @@ one() {
     rm "$out/$part.csv"
   done
 }
+if has contact; then
+  step gpu_contact_obstacle step --phyxels 1000000 --terms green,obstacle --precision float
+  step gpu_contact_bodies step --phyxels 500000 --bodies 2 --terms green,contact --precision float
+  one gpu_contact gpu_contact_obstacle gpu_contact_bodies
+fi
 if has small; then
   small=()
   surfels=()

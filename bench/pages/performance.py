@@ -10,6 +10,7 @@ from pages.tables import markdown_table, read_if_there
 # Targets for one H200, in float unless the name says otherwise.
 TARGET_LARGE, TARGET_DOUBLE = 8e9, 3e9  # phyxel-steps/s of 2 to 17 million phyxels
 TARGET_SETUP = 1                        # s for 16 million phyxels
+TARGET_OBSTACLE, TARGET_CONTACT = 0.02, 0.1  # more time of a step of a million phyxels
 TARGET_WITH_SURFELS = 1e5               # steps/s of the dino
 TARGET_STEPS = {"dino": 2, "alien_head": 1.5}  # µs per step
 
@@ -35,6 +36,10 @@ loads from shared memory."""
 
 SURFELS = """A resident body stores the data of its surfels after each of up to sixteen steps of a launch; a second launch \
 then moves all surfels for all of these steps. If a caller reads surfels after a step, the launch ends with that step."""
+
+CONTACT = """An obstacle is one launch more, which has little to do but waits much: for its start, for the places of the \
+surface's phyxels in device memory, and for what these places hold. Neither smaller blocks, nor sums that are left out \
+or added by each thread, nor a start before the previous launch has ended take more than a tenth of its time away."""
 
 TRIED = """## What was tried
 
@@ -193,6 +198,26 @@ def terms(page, table, _):
                              "error"], cells))
 
 
+def contact(page, table, _):
+    page.paragraph("## Cost of contact")
+    page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
+    page.paragraph(f"Cubes of which a sixth of the surface touches: one that lies on a plane (target: at most "
+                   f"{100 * TARGET_OBSTACLE:.0f}% of a step), and two that lie on each other (target: at most "
+                   f"{100 * TARGET_CONTACT:.0f}%). Scenes without contact run none of its kernels.")
+    cells = []
+    for bodies, term, scene in (("1", "obstacle", "a cube on a plane"), ("2", "contact", "two cubes on each other")):
+        with_term = table.find(bodies=bodies, terms=term)
+        without = table.find(bodies=bodies, terms="green")
+        if not (with_term and without):
+            continue
+        more = without.positive("steps_per_s") / with_term.positive("steps_per_s") - 1
+        cells.append([scene, with_term["phyxels"], f"{1e6 / without.positive('steps_per_s'):.4g}",
+                      f"{1e6 / with_term.positive('steps_per_s'):.4g}", f"{100 * more:.1f}%",
+                      f"{100 * max(row.number('spread') for row in (with_term, without)):.0f}%"])
+    page.add(markdown_table(["scene", "phyxels", "µs per step without", "µs per step with", "more", "spread"], cells))
+    page.paragraph(CONTACT)
+
+
 def setup(page, table, _):
     page.paragraph("## Set-up")
     page.paragraph(f"Measured by {measured_by(table, 'gpu')}.")
@@ -240,7 +265,7 @@ def bin_of_dinos(page, table, _):
 
 
 SECTIONS = {"gpu_error": lambda page, table, results: error.add(page, table, results, "gpu_error"), "gpu_sizes": sizes, "gpu_small": small, "gpu_surfels": surfels, "gpu_neighbours": neighbours,
-            "gpu_cantilever": bending, "gpu_terms": terms, "gpu_setup": setup, "gpu_profile": profile,
+            "gpu_cantilever": bending, "gpu_terms": terms, "gpu_contact": contact, "gpu_setup": setup, "gpu_profile": profile,
             "gpu_bin": bin_of_dinos}
 
 
