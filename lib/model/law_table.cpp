@@ -116,8 +116,8 @@ std::string range_of(const LawParameter& p, const std::string& name) {
 /// range.
 void check_curve(const LawParameter& p, const ParameterValue& value) {
   const std::string allowed =
-      fmt::format("[[x, y], ...], 1 to {} points, x ({}) ascends from 0, {}", p.points, p.argument,
-                  range_of(p, "y"));
+      fmt::format("[[x, y], ...], 1 to {} points, x ({}) ascends from {}0, {}", p.points,
+                  p.argument, p.starts_above_zero ? "above " : "", range_of(p, "y"));
   if (!value.is_curve()) {
     throw InputError(fmt::format("{} = {} found; allowed: {}", p.name, value.text(), allowed));
   }
@@ -128,7 +128,8 @@ void check_curve(const LawParameter& p, const ParameterValue& value) {
   }
   for (std::size_t k = 0; k < curve.size(); ++k) {
     const auto [x, y] = curve[k];
-    const bool ascends = k == 0 ? x == 0 : x > curve[k - 1][0] && std::isfinite(x);
+    const bool begins = p.starts_above_zero ? x > 0 : x == 0;
+    const bool ascends = (k == 0 ? begins : x > curve[k - 1][0]) && std::isfinite(x);
     if (ascends && is_allowed(p, y)) continue;
     throw InputError(
         fmt::format("{}: point {} is [{:g}, {:g}]; allowed: {}", p.name, k + 1, x, y, allowed));
@@ -276,6 +277,18 @@ double hourglass_modulus(const Material& material) {
     } else {
       static_assert(has_young<Law>(), "a law without young_modulus needs hourglass_modulus");
       return material.young;
+    }
+  });
+}
+
+double longest_time(const Material& material) {
+  if (material.custom_law) return 0;
+  const int index = index_of(material.law);
+  return Laws::with_type<double>(index, [&]<class Law>(std::type_identity<Law>) {
+    if constexpr (requires(std::vector<double> v) { Law::longest_time(v); }) {
+      return Law::longest_time(values_of(law_table()[index], material));
+    } else {
+      return 0.0;
     }
   });
 }

@@ -81,8 +81,8 @@ std::vector<SceneKey> law_keys(const std::string& section) {
                    .meaning = fmt::format("With law = {}: {}", laws_with(p.name), p.meaning)};
       if (p.is_curve()) {
         key.type = KeyType::curve;
-        key.curve = {.x = "x", .y = "y", .x_words = fmt::format("x ({}) ascends from 0", p.argument),
-                     .x_range = {0, 1e18, false}, .from_zero = true,
+        key.curve = {.x = "x", .y = "y", .x_words = fmt::format("x ({}) ascends from {}0", p.argument, p.starts_above_zero ? "above " : ""),
+                     .x_range = {0, 1e18, false}, .from_zero = !p.starts_above_zero,
                      .most_points = static_cast<std::size_t>(p.points)};
       }
       keys.push_back(std::move(key));

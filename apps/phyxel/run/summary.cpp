@@ -7,6 +7,7 @@
 
 #include "outside_text.hpp"
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/law_table.hpp"
 #include "run/run.hpp"
 #include "version.hpp"
 
@@ -233,6 +234,14 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
     }
   }
   warn_of_energy("contact of bodies with each other", of_bodies);
+  for (const Part& part : model().parts) {
+    const double steps = longest_time(part.material) / plan_.dt;
+    if (scene_.solver.precision == Precision::double_ || !(steps > most_steps_of_history)) continue;
+    warnings.push_back(fmt::format(
+        "body \"{}\" relaxes in {:.2g} steps, and what a step changes is lost to rounding in {}: "
+        "allowed: up to {:g} steps, or precision double",
+        part.name, steps, precision_name(scene_.solver.precision), most_steps_of_history));
+  }
   if (std::string warning = warning_of_held_overlaps(model(), held_); !warning.empty()) {
     warnings.push_back(std::move(warning));
   }

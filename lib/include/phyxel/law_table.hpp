@@ -69,6 +69,15 @@ std::vector<std::string> history_names(const Material& material);
 /// @throws InputError as `chosen_law`
 double hourglass_modulus(const Material& material);
 
+/// The longest time in which the history of a material follows a deformation by itself, as in creep
+/// and relaxation [s]; 0 without such a time.
+/// @throws InputError as `chosen_law`
+double longest_time(const Material& material);
+
+/// The most steps that `longest_time` may take in single precision: what a step changes of a
+/// history is then a hundred times its rounding or more.
+inline constexpr double most_steps_of_history = 1e5;
+
 /// The stiffness of pressure waves at rest [Pa], the largest of all plane waves: λ + 2μ for Hooke's
 /// law, plus volume conservation. For a custom law it follows from `young` and `poisson`.
 /// @throws InputError as `chosen_law`

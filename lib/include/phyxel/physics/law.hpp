@@ -20,7 +20,8 @@
 ///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] after a step of dt [s];
 ///                                updates `state`
 ///   elastic_stress(grad_u, state)                   ∂ψ/∂∇u [Pa] at a fixed history
-///   plastic_work(state)          work turned into heat since the virgin state [J/m³]
+///   plastic_work(state)          work turned into heat since the virgin state [J/m³], or
+///   viscous_work(state)          the same of laws that relax
 ///
 /// in place of `energy` and `first_piola_stress` of ∇u alone. A law may have
 ///
@@ -29,6 +30,8 @@
 ///   the modulus [Pa] that scales hourglass control; without it, the parameter `young_modulus`
 ///   static constexpr bool work_is_potential = false;
 ///   stored energy and plastic work after a step are not a potential of the stress after it
+///   static double longest_time(std::span<const double> values);
+///   the longest time [s] in which its history follows a deformation (creep, relaxation)
 ///   static const char* unmet(std::span<const double> values);
 ///   the condition that parameters, each within its range, violate together, as the error message
 ///   states it, e.g. "a > 2 b"; "" if there is none
@@ -70,9 +73,10 @@ struct LawParameter {
   int count = 1;
   double vector_fallback[3] = {0, 0, 0};
   /// The largest number of points of a curve [[x, y], ...]; 0: the parameter is no curve. Its x
-  /// ascend from 0, and each y is within the range. `constants` takes this number of points x, y
-  /// one after the other, the last point repeated.
+  /// ascend from 0, which is the first, and each y is within the range. `constants` takes this
+  /// number of points x, y one after the other, the last point repeated.
   int points = 0;
+  bool starts_above_zero = false;         ///< True for a curve whose first x is above 0.
   const char* argument = "";              ///< What x is, in the reference, e.g. "plastic strain".
   double typical_curve[2][2] = {{0, 0}};  ///< Takes the place of `typical`.
 
@@ -253,6 +257,11 @@ struct SumOf {
     law.plastic_work(state);
   }
   { return first.plastic_work(state); }
+  /// Heat of relaxation of the first law [J/m³].
+  PHYXEL_HD auto viscous_work(const State& state) const requires requires(const First& law) {
+    law.viscous_work(state);
+  }
+  { return first.viscous_work(state); }
   /// The linearisation of both laws at rest; the second is `VolumeConservation`.
   PHYXEL_HD auto at_rest() const { return first.at_rest(second.stiffness); }
   /// An upper bound of ρc² [Pa].

@@ -8,6 +8,7 @@
 #include "phyxel/physics/laws/j2.hpp"
 #include "phyxel/physics/laws/j2_curve.hpp"
 #include "phyxel/physics/laws/johnson_cook.hpp"
+#include "phyxel/physics/laws/maxwell.hpp"
 #include "phyxel/physics/laws/mooney_rivlin.hpp"
 #include "phyxel/physics/laws/neo_hookean.hpp"
 #include "phyxel/physics/laws/orthotropic.hpp"
@@ -20,7 +21,7 @@ namespace phyxel {
 
 /// Every law, in the order of the reference of scenes.
 using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
-                     Orthotropic, J2, J2Curve, JohnsonCook, Clay>;
+                     Orthotropic, J2, J2Curve, JohnsonCook, Clay, Maxwell>;
 
 /// An upper bound of the factor by which viscosity exceeds that at rest: it acts on the rate of
 /// Green's strain, and so grows as the stretch squared.
@@ -98,6 +99,7 @@ PHYXEL_HD PointResponse<Real> response_after_step(int law, const Constant* const
     }
     response.strain_energy = stored_energy(own, grad_u, state);
     response.plastic_work = plastic_work<Real>(own, state);
+    response.viscous_work = response.viscous_work + viscous_work<Real>(own, state);
     if (solid.second.stiffness > Real(0)) response.volume_energy = solid.second.energy(grad_u);
     return response;
   });

@@ -72,6 +72,8 @@ struct Clay {
     const std::array<double, 2> lame = lame_constants(p);
     return {lame[0], lame[1], p[2], p[3], p[4], p[5]};
   }
+  /// The time of creep [s].
+  static double longest_time(std::span<const double> p) { return p[3]; }
   /// The smaller of E and ten times the stress at yield [Pa].
   static double hourglass_modulus(std::span<const double> p) {
     return flowing_modulus(p[0], p[0] * p[2]);

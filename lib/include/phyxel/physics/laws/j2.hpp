@@ -62,6 +62,7 @@ struct J2 : PlasticFlow<J2<Real>, Real> {
   }
 
   static constexpr auto& history = plastic_history;
+  /// The history of a phyxel; all zero: never yielded.
   using State = PlasticState<Real>;
 
   Real lambda, mu;         ///< Lamé's parameters [Pa].

@@ -64,6 +64,7 @@ struct J2Curve : PlasticFlow<J2Curve<Real>, Real> {
   }
 
   static constexpr auto& history = plastic_history;
+  /// The history of a phyxel; all zero: never yielded.
   using State = PlasticState<Real>;
 
   Real lambda, mu;          ///< Lamé's parameters [Pa].

@@ -159,6 +159,27 @@ struct PlasticState : PlasticFactor<Real> {
   Real equivalent_plastic_strain{};  ///< ε̄
 };
 
+/// An upper bound of the stiffness of plane waves [Pa] (physics/law.hpp) of a spring of Hencky's
+/// law that follows F but for a flow that keeps the volume, whatever the flow: the stiffness of
+/// elastic unloading, times 1/s² of the smallest total stretch (at least 0.01).
+/// @param von_mises an upper bound of the spring's von Mises stress [Pa]
+/// @param s total stretches
+template <class Real>
+PHYXEL_HD Real wave_stiffness_of_flow(Real lambda, Real mu, Real von_mises,
+                                      const PrincipalStretches<Real>& s) {
+  // (ln s_a - ln s_b) between elastic principal stretches is at most q/(√3 μ).
+  const Real gap = von_mises / (Real(1.7320508075688772) * mu), square = gap * gap;
+  const Real volume = larger(Real(0.1), s.largest * s.middle * s.smallest);
+  const Real mean = fused(Real(2.0 / 3), mu, lambda) * log_one_plus(volume - Real(1));
+  const Real third = Real(1.0 / 3) * von_mises;
+  WaveBound<Real> bound;
+  bound.add_diagonal(lambda + Real(2) * mu - mean + Real(2) * third);
+  const Real mixed = lambda + mu - mean, bend = Real(1.0 / 3) * square;
+  bound.add_pair(larger(-mixed, mixed) + mu * bend + third, mu * (Real(1) + gap + bend));
+  const Real smallest = larger(Real(0.01), s.smallest);
+  return bound.value() / (smallest * smallest);
+}
+
 /// J2 plasticity, the base of laws of metals. `Law` derives from it and has the members `lambda`
 /// and `mu` [Pa], `State`, which derives from `PlasticState`, and the functions
 ///   flow_stress(state)                      σ_y [Pa] of a history, at slow rates
@@ -214,24 +235,10 @@ struct PlasticFlow {
     }
     return before.times_transpose(trial.first_piola_stress(lambda_secant, secant));
   }
-  /// An upper bound of the stiffness of plane waves [Pa] (physics/law.hpp), whatever the history.
-  /// It is the stiffness of elastic unloading, at elastic
-  /// stretches whose ratios the flow stress limits, times 1/s² of the smallest total stretch (at
-  /// least 0.01).
+  /// An upper bound of the stiffness of plane waves [Pa] (physics/law.hpp), whatever the history,
+  /// at elastic stretches that the flow stress limits.
   PHYXEL_HD Real wave_stiffness(const PrincipalStretches<Real>& s) const {
-    const Real lambda = law().lambda, mu = law().mu;
-    const Real q = law().largest_flow_stress();
-    // (ln s_a - ln s_b) between elastic principal stretches is at most q/(√3 μ).
-    const Real gap = q / (Real(1.7320508075688772) * mu), square = gap * gap;
-    const Real volume = larger(Real(0.1), s.largest * s.middle * s.smallest);
-    const Real mean = fused(Real(2.0 / 3), mu, lambda) * log_one_plus(volume - Real(1));
-    const Real third = Real(1.0 / 3) * q;
-    WaveBound<Real> bound;
-    bound.add_diagonal(lambda + Real(2) * mu - mean + Real(2) * third);
-    const Real mixed = lambda + mu - mean, bend = Real(1.0 / 3) * square;
-    bound.add_pair(larger(-mixed, mixed) + mu * bend + third, mu * (Real(1) + gap + bend));
-    const Real smallest = larger(Real(0.01), s.smallest);
-    return bound.value() / (smallest * smallest);
+    return wave_stiffness_of_flow(law().lambda, law().mu, law().largest_flow_stress(), s);
   }
 
  private:

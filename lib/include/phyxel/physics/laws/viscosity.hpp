@@ -40,8 +40,10 @@ struct WithViscosity {
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u, const State& state) const {
     return stored_energy(law, grad_u, state.law);
   }
-  /// Work that viscosity has turned into heat [J/m³].
-  PHYXEL_HD Real viscous_work(const State& state) const { return state.viscous_work; }
+  /// Work that viscosity and the wrapped law's relaxation have turned into heat [J/m³].
+  PHYXEL_HD Real viscous_work(const State& state) const {
+    return state.viscous_work + phyxel::viscous_work<Real>(law, state.law);
+  }
   /// Plastic work of the wrapped law [J/m³].
   PHYXEL_HD Real plastic_work(const State& state) const {
     return phyxel::plastic_work<Real>(law, state.law);
