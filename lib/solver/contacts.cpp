@@ -153,6 +153,21 @@ void check_held(const Model& model, const HeldOverlaps& overlaps) {
   }
 }
 
+/// What else may have led phyxels into an obstacle, for the message: a free body that they cannot
+/// push, since supports hold them along its normal.
+std::string held_in_part(const Model& model, const std::string& obstacle) {
+  const bool is_free =
+      std::any_of(model.obstacles.begin(), model.obstacles.end(), [&](const Obstacle& each) {
+        return each.free && each.name == obstacle && !(each.penalty > 0);
+      });
+  const bool some_are_held = std::any_of(model.motions.begin(), model.motions.end(),
+                                         [](const Motion& motion) { return !motion.axes.all(); });
+  if (!is_free || !some_are_held) return "";
+  return ", or supports hold them along its normal but not along all axes, and then they cannot "
+         "push "
+         "a free body (allowed there: method = \"penalty\" of the obstacle)";
+}
+
 /// Refuses readings of phyxels that an obstacle has left inside another one, or that it cannot
 /// hold.
 void check_depths(const Model& model, const std::vector<ContactReading>& readings) {
@@ -167,10 +182,11 @@ void check_depths(const Model& model, const std::vector<ContactReading>& reading
     say_diverged(
         model, fmt::format("phyxels{} are up to {:.3g} m deep in {}, {:.3g} of {}, {} of it is "
                            "allowed: something presses them into it, or they are too fast for the "
-                           "step{}",
+                           "step{}{}",
                            whose, reading.depth, where, reading.depth_share,
                            is_body ? "the smaller support of both" : "their support", allowed,
-                           has_penalties(model) ? ", or penalties are too soft (stiffness)" : ""));
+                           has_penalties(model) ? ", or penalties are too soft (stiffness)" : "",
+                           is_body ? "" : held_in_part(model, reading.obstacle)));
   }
 }
 

@@ -34,6 +34,24 @@ TEST(ContactAccuracy, APressedBallPushesBackAsFiniteElementsDo) {
   EXPECT_LT(std::abs(error_of(fine, "pressure at the pole")), 0.1);
 }
 
+/// The half width of contact is 3 spacings: it is known to a sixth of one, and the force as that of
+/// a ball.
+TEST(ContactAccuracy, APressedCylinderPushesBack) {
+  const Solution nodes = solved("cylinder", {.across = 40});
+  const Solution mesh =
+      solved("cylinder", {.filling = Filling::mesh, .closure = 1e-3, .across = 40});
+  for (const Solution& s : {nodes, mesh}) {
+    EXPECT_LT(std::abs(error_of(s, "force")), 0.035);
+    EXPECT_LT(std::abs(error_of(s, "half width")), 0.055);
+  }
+}
+
+/// Euler and Eytelwein's ratio leaves out the stiffness of the strap against bending, of order
+/// E (t/R)²/24 beside tensions of E/100, of which a tenth of the strap feels some: below 1%.
+TEST(ContactAccuracy, ASlidingStrapHasTensionsAsEulerSays) {
+  EXPECT_LT(std::abs(error_of(solved("strap", {.across = 2}), "ratio of tensions")), 0.01);
+}
+
 /// Steps need no depth; what is left on nodes (seen: 1.3%) comes from the edge of the contact,
 /// which lies between two rows of phyxels. Triangles as wide as a spacing, R/10, cut off R/800 to
 /// R/400 of an approach of R/25: 5% to 9% of the force.

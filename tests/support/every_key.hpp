@@ -287,6 +287,18 @@ yield_strain = 0.01 # body.inclusion.yield_strain => yield_strain = 0.02
 creep_time = 0.1 # body.inclusion.creep_time => creep_time = 0.2
 plastic_limit = 0.5 # body.inclusion.plastic_limit => plastic_limit = 0.6
 plastic_volume = 0 # body.inclusion.plastic_volume => plastic_volume = 1
+[[body]]
+name = 'eleventh'
+cloud = 'd'
+[body.material]
+law = 'maxwell'
+young = 1e5
+poisson = 0.3
+relaxation = [[0.1, 0.2], [1, 0.3]] # body.material.relaxation => relaxation = [[0.1, 0.2], [2, 0.3]]
+density = 1000
+[[body.inclusion]]
+region = 'x-'
+relaxation = [[0.1, 0.2], [1, 0.3]] # body.inclusion.relaxation => relaxation = [[0.1, 0.2], [1, 0.4]]
 [[probe]]
 name = 'tip' # probe.name => name = 'top'
 body = 'third' # probe.body => body = 'fourth'

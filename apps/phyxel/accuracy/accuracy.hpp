@@ -57,13 +57,14 @@ struct AccuracyCase {
   std::string group = {};  ///< A name that chooses several cases; empty for most.
 };
 
-std::vector<AccuracyCase> static_cases();     ///< Elastic bodies at rest.
-std::vector<AccuracyCase> dynamic_cases();    ///< Elastic bodies that move.
-std::vector<AccuracyCase> plastic_cases();    ///< Bodies of metal in uniform states.
-std::vector<AccuracyCase> collapse_cases();   ///< Bodies of metal under their collapse loads.
-std::vector<AccuracyCase> impact_cases();     ///< Bars of metal that strike a wall.
-std::vector<AccuracyCase> contact_impacts();  ///< Bodies that hit each other.
-std::vector<AccuracyCase> contact_cases();    ///< Bodies in contact: the group "contact".
-std::vector<AccuracyCase> accuracy_cases();   ///< All of them.
+std::vector<AccuracyCase> static_cases();       ///< Elastic bodies at rest.
+std::vector<AccuracyCase> dynamic_cases();      ///< Elastic bodies that move.
+std::vector<AccuracyCase> plastic_cases();      ///< Bodies of metal in uniform states.
+std::vector<AccuracyCase> collapse_cases();     ///< Bodies of metal under their collapse loads.
+std::vector<AccuracyCase> impact_cases();       ///< Bars of metal that strike a wall.
+std::vector<AccuracyCase> contact_impacts();    ///< Bodies that hit each other.
+std::vector<AccuracyCase> contact_cylinders();  ///< Cylinders and straps in contact.
+std::vector<AccuracyCase> contact_cases();      ///< Bodies in contact: the group "contact".
+std::vector<AccuracyCase> accuracy_cases();     ///< All of them.
 
 }  // namespace phyxel::app

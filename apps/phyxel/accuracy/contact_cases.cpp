@@ -16,25 +16,6 @@ namespace {
 
 constexpr double gravity = 9.81;  // [m/s²]
 
-ObstacleRequest plane(const char* name, Vec3d normal, Vec3d at, double friction = 0) {
-  ObstacleRequest obstacle;
-  obstacle.name = name;
-  obstacle.shape = "plane";
-  obstacle.normal = normal;
-  obstacle.translation = at;
-  obstacle.friction = friction;
-  obstacle.where = "phyxel accuracy";
-  return obstacle;
-}
-
-/// A plane that moves by `by` [m] within `duration` [s].
-ObstacleRequest ram(Vec3d normal, Vec3d at, Vec3d by, double duration) {
-  ObstacleRequest obstacle = plane("ram", normal, at);
-  obstacle.motion.displacement = by;
-  obstacle.motion.duration = duration;
-  return obstacle;
-}
-
 constexpr double pressed_radius = 0.1;  // of a ball [m]
 
 /// A ball between two planes that press it: an eighth of it, and planes of symmetry.
@@ -274,6 +255,7 @@ std::vector<AccuracyCase> contact_cases() {
        .solve = pressed_blocks,
        .hourglass = {0.1},
        .fillings = {Filling::nodes, Filling::mesh}});
+  for (AccuracyCase& c : contact_cylinders()) cases.push_back(std::move(c));
   for (AccuracyCase& c : cases) c.group = "contact";
   return cases;
 }

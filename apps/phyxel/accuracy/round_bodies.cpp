@@ -188,6 +188,56 @@ Cloud quarter_tube(const Discretisation& d, double inner_radius, double outer_ra
               d, spacing);
 }
 
+double thickness_of_slice(const Discretisation& d, double radius) {
+  return 2 * (2 * radius / d.across);
+}
+
+Cloud quarter_of_cylinder(const Discretisation& d, double radius) {
+  const double spacing = 2 * radius / d.across, slice = thickness_of_slice(d, radius);
+  const int around = static_cast<int>(std::lround(0.25 * pi * radius / spacing)),
+            deep = static_cast<int>(std::lround(0.5 * radius / spacing));
+  // A place whose larger component is 1, between the axis and the inner block's outside.
+  const auto inside = [=](Vec3d side) { return 0.5 * radius * (0.4 + 0.6 / norm(side)) * side; };
+  const auto lifted = [=](Vec3d p, double z) { return p + Vec3d{0, 0, slice * z}; };
+  std::vector<BentBlock> blocks{
+      {{around, around, 2}, [=](Vec3d p) {
+         const Vec3d side{std::tan(0.25 * pi * p.x), std::tan(0.25 * pi * p.y), 0};
+         const double larger = std::max(side.x, side.y);
+         if (larger == 0) return lifted({}, p.z);
+         return lifted(larger * inside((1 / larger) * side), p.z);
+       }}};
+  for (const bool above : {false, true}) {
+    // From the inner block outwards along x of the cell, or along y of it above.
+    const std::array<int, 3> cells =
+        above ? std::array{around, deep, 2} : std::array{deep, around, 2};
+    blocks.push_back({cells, [=](Vec3d p) {
+                        const double along = above ? p.x : p.y, out = above ? p.y : p.x;
+                        const double slope = std::tan(0.25 * pi * along);
+                        const Vec3d v = above ? Vec3d{slope, 1, 0} : Vec3d{1, slope, 0};
+                        return lifted((1 - out) * inside(v) + (out * radius / norm(v)) * v, p.z);
+                      }});
+  }
+  return bent(blocks, d, spacing, true);
+}
+
+Cloud strap_on_drum(const Discretisation& d, double radius, double thickness, double tail) {
+  const double spacing = thickness / d.across, slice = 2 * spacing;
+  const int around = static_cast<int>(std::lround(pi * (radius + 0.5 * thickness) / spacing)),
+            down = static_cast<int>(std::lround(tail / spacing));
+  std::vector<BentBlock> blocks{
+      {{d.across, around, 2}, [=](Vec3d p) {
+         const double r = radius + thickness * p.x, angle = pi * p.y;
+         return Vec3d{r * std::cos(angle), r * std::sin(angle), slice * p.z};
+       }}};
+  for (const double side : {1.0, -1.0}) {
+    blocks.push_back({{d.across, down, 2}, [=](Vec3d p) {
+                        const double r = radius + thickness * (side > 0 ? p.x : 1 - p.x);
+                        return Vec3d{side * r, tail * (p.y - 1), slice * p.z};
+                      }});
+  }
+  return bent(blocks, d, spacing, true);
+}
+
 Cloud eighth_of_shell(const Discretisation& d, double inner_radius, double outer_radius) {
   const double wall = outer_radius - inner_radius, spacing = wall / d.across;
   const double middle = 0.5 * (inner_radius + outer_radius);

@@ -9,6 +9,15 @@ namespace phyxel::app {
 /// A quarter of a tube about the z axis, x and y >= 0, 0 <= z <= two spacings: three layers.
 /// `across` counts cells of the wall. Nodes or a mesh.
 Cloud quarter_tube(const Discretisation& d, double inner_radius, double outer_radius);
+/// A quarter of a cylinder about the z axis, x and y >= 0, 0 <= z <= two spacings: three layers,
+/// with its surface. `across` counts cells of the diameter. Nodes or a mesh.
+Cloud quarter_of_cylinder(const Discretisation& d, double radius);
+/// The thickness of that slice [m].
+double thickness_of_slice(const Discretisation& d, double radius);
+/// A strap on the upper half of a drum about the z axis, 0 <= z <= two spacings, with its surface
+/// and straight tails from y = 0 down to -`tail`. `across` counts cells of the thickness. Nodes or
+/// a mesh.
+Cloud strap_on_drum(const Discretisation& d, double radius, double thickness, double tail);
 /// An eighth of a hollow sphere, x, y and z >= 0. `across` counts cells of the wall. Nodes or a
 /// mesh.
 Cloud eighth_of_shell(const Discretisation& d, double inner_radius, double outer_radius);

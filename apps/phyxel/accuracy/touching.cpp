@@ -70,6 +70,24 @@ BodyRequest contact_body(const Discretisation& d, const char* name, double poiss
   return body;
 }
 
+ObstacleRequest plane(const char* name, Vec3d normal, Vec3d at, double friction) {
+  ObstacleRequest obstacle;
+  obstacle.name = name;
+  obstacle.shape = "plane";
+  obstacle.normal = normal;
+  obstacle.translation = at;
+  obstacle.friction = friction;
+  obstacle.where = "phyxel accuracy";
+  return obstacle;
+}
+
+ObstacleRequest ram(Vec3d normal, Vec3d at, Vec3d by, double duration) {
+  ObstacleRequest obstacle = plane("ram", normal, at);
+  obstacle.motion.displacement = by;
+  obstacle.motion.duration = duration;
+  return obstacle;
+}
+
 Cloud block_cloud(const Discretisation& d, Vec3d size, double spacing) {
   BodyRequest body = contact_body(d, "block", 0);
   body.source.shape = {.name = "block",

@@ -50,6 +50,10 @@ class Touching {
 
 /// A body with the material and the terms of a contact problem, without a source.
 BodyRequest contact_body(const Discretisation& d, const char* name, double poisson);
+/// A plane as an obstacle.
+ObstacleRequest plane(const char* name, Vec3d normal, Vec3d at, double friction = 0);
+/// A plane that moves by `by` [m] within `duration` [s].
+ObstacleRequest ram(Vec3d normal, Vec3d at, Vec3d by, double duration);
 /// A block about the origin, with its surface. @param spacing between nodes [m]
 Cloud block_cloud(const Discretisation& d, Vec3d size, double spacing);
 /// A ball about the origin, with its surface. `across` counts cells of the diameter. Cells or a
