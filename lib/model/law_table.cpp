@@ -281,6 +281,18 @@ double hourglass_modulus(const Material& material) {
   });
 }
 
+double shortest_time(const Material& material) {
+  if (material.custom_law) return 0;
+  const int index = index_of(material.law);
+  return Laws::with_type<double>(index, [&]<class Law>(std::type_identity<Law>) {
+    if constexpr (requires(std::vector<double> v) { Law::shortest_time(v); }) {
+      return Law::shortest_time(values_of(law_table()[index], material));
+    } else {
+      return 0.0;
+    }
+  });
+}
+
 double longest_time(const Material& material) {
   if (material.custom_law) return 0;
   const int index = index_of(material.law);

@@ -162,7 +162,7 @@ Equilibrium find_equilibrium(const Model& model, Backend& backend,
   Balance balance = whole_balance(model, newton);
   if (!touches(model)) refuse_unsupported_bodies(model, balance);  // else something may hold them
   Equilibrium found;
-  backend.set_history_interval(0);
+  backend.set_history_interval(endless_time);
   backend.download(found.state);
   found.state.displacement = options.start ? *options.start : vectors.make();
   found.state.velocity = vectors.make();

@@ -36,7 +36,7 @@ class CustomLaw {
   virtual double energy(const Mat3d& grad_u, std::span<const double> numbers) const;
   /// Stress P at the end of a step [Pa].
   /// @param numbers history at the start of the step, updated to its end, shape [history().size()]
-  /// @param dt length of the step [s]; 0 if no time has passed
+  /// @param dt length of the step [s]; 0 if no time has passed, `endless_time` in a search for rest
   virtual Mat3d first_piola_stress(const Mat3d& grad_u, std::span<double> numbers, double dt) const;
   /// The derivative ∂ψ/∂∇u at constant history [Pa].
   virtual Mat3d elastic_stress(const Mat3d& grad_u, std::span<const double> numbers) const;

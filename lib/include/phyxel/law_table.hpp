@@ -69,6 +69,11 @@ std::vector<std::string> history_names(const Material& material);
 /// @throws InputError as `chosen_law`
 double hourglass_modulus(const Material& material);
 
+/// The shortest time in which the history of a material follows a deformation by itself, which
+/// steps have to resolve [s]; 0 without such a time.
+/// @throws InputError as `chosen_law`
+double shortest_time(const Material& material);
+
 /// The longest time in which the history of a material follows a deformation by itself, as in creep
 /// and relaxation [s]; 0 without such a time.
 /// @throws InputError as `chosen_law`

@@ -58,7 +58,7 @@ struct State {
   /// and for laws that remember nothing.
   std::vector<HistoryColumn> history;
   /// Time from the history to the displacements [s]: the last step, after Verlet's; 0: they belong
-  /// together, so that nothing has a rate.
+  /// together, so that nothing has a rate; `endless_time` of a search for rest.
   double history_interval = 0;
   double time = 0;  ///< t [s] = step * dt.
   std::int64_t step = 0;

@@ -149,12 +149,12 @@ TEST(JohnsonCook, HeatsByTheIntegralOfItsPlasticWork) {
 
 /// Whatever the rate, the temperature and the size of the step: nine Newton steps reach it.
 TEST(JohnsonCook, EndsOnTheYieldSurfaceAfterStepsOfAnySize) {
-  for (const double dt : {0.0, 1e-9, 1e-6, 1e-2, 10.0}) {
+  for (const double dt : {endless_time, 1e-9, 1e-6, 1e-2, 10.0}) {
     Copper copper;
     copper.heat = 4e4;  // trial strains of 1 would melt copper at once
     expect_yield_surface(
         law_of<Law>(copper), dt, [&](const auto& s, double increment, double warm) {
-          return copper.flow_stress(s.equivalent_plastic_strain, dt > 0 ? increment / dt : 0, warm);
+          return copper.flow_stress(s.equivalent_plastic_strain, increment / dt, warm);
         });
   }
 }
@@ -173,12 +173,12 @@ TEST(JohnsonCook, SolvesItsScalarEquation) {
     const Law law = law_of<Law>(p);
     Law::State state;
     state.equivalent_plastic_strain = k % 4 == 0 ? 0 : std::pow(10, any.uniform(-6, 1));
-    const double dt = k % 7 == 0 ? 0 : std::pow(10, any.uniform(-14, -1));
+    const double dt = k % 7 == 0 ? endless_time : std::pow(10, any.uniform(-14, -1));
     const double excess = p.a * std::pow(10, any.uniform(-9, 2)), mu = law.mu;
     const double x = law.plastic_increment(excess, state, dt), begin = law.flow_stress(state);
     Law::State after = state;
     after.equivalent_plastic_strain += x;
-    const double rate = dt > 0 ? std::max(1.0, x / dt) : 1;
+    const double rate = std::max(1.0, x / dt);
     const double end = law.flow_stress(after) * (1 + p.c * std::log(rate));
     worst = std::max(worst, std::abs(3 * mu * x + end - begin - excess) / (end + excess));
     ASSERT_GE(x, 0);
@@ -239,7 +239,7 @@ TEST(JohnsonCook, StressIsTheDerivativeOfTheStoredEnergyAtAFrozenHistory) {
 TEST(JohnsonCook, LanesOfAPackHaveTheBitsOfScalars) {
   expect_lanes_to_have_the_bits_of_scalars<JohnsonCook, float, 16>(Copper{}, 1e-5);
   expect_lanes_to_have_the_bits_of_scalars<JohnsonCook, double, 8>(Copper{}, 1e-5);
-  expect_lanes_to_have_the_bits_of_scalars<JohnsonCook, double, 8>(Copper{}, 0);
+  expect_lanes_to_have_the_bits_of_scalars<JohnsonCook, double, 8>(Copper{}, endless_time);
 }
 TEST(JohnsonCook, WaveStiffnessIsBounded) {
   Law strong = law_of<Law>(Copper{});

@@ -61,8 +61,8 @@ TEST(Maxwell, RelaxesAsTheSeriesDoes) {
       const M3 deviator = first - first.trace() / 3 * M3::Identity();
       Law::State state;
       double time = 0;
-      // A sudden stretch: its step itself takes no time.
-      for (const double dt : {1e-300, 1e-4, 0.01, 0.05, 0.3, 3.0, 40.0}) {
+      for (const double dt : {0.0, 1e-4,  // at first a sudden stretch
+                              0.01, 0.05, 0.3, 3.0, 40.0}) {
         time += dt;
         const M3 p = stress_at(law, f, state, dt);
         // Rounding of strains of 1 times E, magnified by stretches up to five times each other.
@@ -86,7 +86,7 @@ TEST(Maxwell, IsElasticAtRest) {
   Law::State state;
   for (int k = 0; k < 100; ++k) {
     const M3 f = any.gradient(0.6, 1.6);
-    const M3 p = stress_at(law, f, state, k % 2 == 0 ? 0 : 1e9);
+    const M3 p = stress_at(law, f, state, k % 2 == 0 ? endless_time : 1e9);
     EXPECT_LE(distance(p, eigen(lasting.first_piola_stress(grad_u(f)))), 1e-12 * young);
     EXPECT_NEAR(law.energy(grad_u(f), state), lasting.energy(grad_u(f)), 1e-12 * young);
   }
@@ -129,9 +129,11 @@ TEST(Maxwell, HeatIsWhatSpringsLose) {
   for (int k = 0; k < 20; ++k) {
     Law::State state;
     const M3 f = any.gradient(0.6, 1.7);
+    stress_at(law, f, state, 0);  // a sudden stretch
+    EXPECT_EQ(state.relaxation_work, 0);
     double stored = law.energy(grad_u(f), state);
     const double all = stored;
-    for (const double dt : {0.01, 0.1, 1.0, 10.0, 0.0}) {
+    for (const double dt : {0.01, 0.1, 1.0, 10.0, endless_time}) {
       const double before = state.relaxation_work;
       stress_at(law, f, state, dt);
       const double now = law.energy(grad_u(f), state);
@@ -142,10 +144,21 @@ TEST(Maxwell, HeatIsWhatSpringsLose) {
     }
   }
 }
+/// Heat is that of the forces at the ends of steps: the balance is of second order in the step, but
+/// where strains at its ends are not coaxial.
 TEST(Maxwell, WorkIsStoredOrBecomesHeat) {
-  // First order in Δt/τ: 2,000 steps of 0.02 τ of the fastest branch.
-  expect_balance_of_work(law_of<Law>(material(one)), 1, 5e-3);
-  expect_balance_of_work(law_of<Law>(material(three)), 1, 2e-2);
+  expect_balance_of_work(law_of<Law>(material(one)), 1, 1e-4);
+  expect_balance_of_work(law_of<Law>(material(three)), 1, 1e-4);
+}
+/// A slow deformation, whose dashpots follow at once, makes no heat: springs of branches carry
+/// nothing.
+TEST(Maxwell, WithoutHeatComesToRest) {
+  const Law law = law_of<Law>(material(three));
+  Law::State state;
+  for (const double stretch : {1.2, 0.8, 1.5}) {
+    stress_at(law, V3(stretch, 1, 1).asDiagonal(), state, endless_time);
+  }
+  EXPECT_EQ(state.relaxation_work, 0);
 }
 TEST(Maxwell, TurningBodiesChangesNothing) {
   expect_rotation_invariance(law_of<Law>(material(three)), young, 1e-2);
@@ -157,6 +170,7 @@ TEST(Maxwell, LanesOfAPackHaveTheBitsOfScalars) {
   expect_lanes_to_have_the_bits_of_scalars<Maxwell, float, 16>(material(three), 0.01);
   expect_lanes_to_have_the_bits_of_scalars<Maxwell, double, 8>(material(three), 0.01);
   expect_lanes_to_have_the_bits_of_scalars<Maxwell, double, 8>(material(one), 0);
+  expect_lanes_to_have_the_bits_of_scalars<Maxwell, double, 8>(material(one), endless_time);
 }
 
 /// Two branches of one relaxation time are one of both shares.
@@ -181,7 +195,7 @@ TEST(Maxwell, WaveStiffnessIsBounded) {
     const M3 f = any.gradient(0.6, 1.6);
     // Every other body has relaxed at the opposite strain, the others at any of up to a quarter.
     const M3 before = k % 2 == 0 ? M3(f.inverse()) : any.gradient(0.8, 1.25);
-    stress_at(law, before, state, 0);
+    stress_at(law, before, state, endless_time);
     const double bound = law.wave_stiffness(principal_stretches(grad_u(f)));
     for (const double dt : {1e-9, 1e-3, 1.0}) {
       const auto stress = [&](const M3& at) {

@@ -17,8 +17,8 @@
 ///   struct State                 the numbers of one phyxel, each a `Real`; all zero if virgin
 ///   static constexpr HistoryNumber history[];       their names, in the order of the members
 ///   energy(grad_u, state)        the energy density that is stored [J/m³]
-///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] after a step of dt [s];
-///                                updates `state`
+///   first_piola_stress(grad_u, state&, dt)          the stress [Pa] after a step of dt [s], from
+///                                0, no time at all, to `endless_time`; updates `state`
 ///   elastic_stress(grad_u, state)                   ∂ψ/∂∇u [Pa] at a fixed history
 ///   plastic_work(state)          work turned into heat since the virgin state [J/m³], or
 ///   viscous_work(state)          the same of laws that relax
@@ -30,6 +30,8 @@
 ///   the modulus [Pa] that scales hourglass control; without it, the parameter `young_modulus`
 ///   static constexpr bool work_is_potential = false;
 ///   stored energy and plastic work after a step are not a potential of the stress after it
+///   static double shortest_time(std::span<const double> values);
+///   the shortest time [s] in which its history follows a deformation, which steps have to resolve
 ///   static double longest_time(std::span<const double> values);
 ///   the longest time [s] in which its history follows a deformation (creep, relaxation)
 ///   static const char* unmet(std::span<const double> values);
@@ -128,6 +130,11 @@ inline constexpr bool needs_many_registers = [] {
   if constexpr (requires { Law::many_registers; }) return Law::many_registers;
   return false;
 }();
+
+/// The time [s] that passes from a history to a state of rest: whatever creeps or relaxes has done
+/// so, nothing has a rate, and heat is gone. An interval of 0 is no time at all: nothing creeps,
+/// relaxes or flows at a finite rate.
+inline constexpr double endless_time = 1e30;
 
 /// The history of a law without one: an empty type, which costs no argument, array, load or store.
 struct NoHistory {};

@@ -34,13 +34,14 @@ struct J2Curve : PlasticFlow<J2Curve<Real>, Real> {
        .argument = "plastic strain",
        .typical_curve = {{0, 1e5}, {0.2, 2e5}}}};
 
-  /// Rejects curves that fall so fast that a step has no single answer.
+  /// Rejects curves that fall so fast that a step has no single answer, or rise beyond all numbers.
   static const char* unmet(std::span<const double> p) {
     const double mu = lame_constants(p)[1];
     for (int k = 1; k < points; ++k) {
       const double strain = p[2 * k + 2] - p[2 * k], stress = p[2 * k + 3] - p[2 * k + 1];
-      if (strain > 0 && !(stress > -mu * strain)) {
-        return "a flow_curve that nowhere falls by the shear modulus times the strain or more";
+      if (strain > 0 && !(stress > -mu * strain && stress <= 1e18 * strain)) {
+        return "a flow_curve that nowhere falls by the shear modulus times the strain or more, nor "
+               "rises by more than 1e18 Pa times the strain";
       }
     }
     return "";

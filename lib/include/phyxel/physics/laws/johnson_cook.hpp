@@ -8,7 +8,8 @@
 /// Within a step σ_y is that of the temperature at its start. ε̄ⁿ has an infinite slope at 0; below
 /// ε₀ = 10⁻⁶ it is continued by the line to 0.
 ///
-/// Without a time step, in searches for equilibrium, the rate is as slow as ε̄˙₀: its factor is 1.
+/// In the endless time of a search for equilibrium the rate is as slow as ε̄˙₀, and its factor is 1;
+/// heat is gone, so the temperature stays. In no time (Δt = 0) nothing flows if C > 0.
 #pragma once
 
 #include <array>
@@ -205,16 +206,19 @@ struct JohnsonCook : PlasticFlow<JohnsonCook<Real>, Real> {
       const Real instead = where_larger(low, next, where_larger(part, low, part, middle), next);
       x = where_larger(next, high, middle, instead);
     }
-    return x;
+    const Real in_time = where_larger(dt, Real(0), x, Real(0));
+    return where_larger(rate_factor, Real(0), in_time, x);
   }
-  /// Adds Δε̄ and the heat of its work to a history where the excess is positive. The work is that
+  /// Adds Δε̄ and the heat of its work to a history where the excess is positive; no heat in an
+  /// endless time. The work is that
   /// of the mean of the flow stresses at the begin and the end, at the rate of the step.
   PHYXEL_HD void remember(State& state, Real excess, Real increment, Real dt) const {
     Real& e = state.equivalent_plastic_strain;
     const Real after = e + increment;
     const Real mean = Real(0.5) * (hardened(e).stress + hardened(after).stress);
     const Real stress = mean * softened(state) * rate_of(increment, reference_rate * dt).factor;
-    const Real warmer = fused(heating * stress, increment, state.temperature_rise);
+    const Real heat = where_larger(Real(endless_time), dt, heating * stress, Real(0));
+    const Real warmer = fused(heat, increment, state.temperature_rise);
     e = where_larger(excess, Real(0), after, e);
     state.temperature_rise = where_larger(excess, Real(0), warmer, state.temperature_rise);
   }

@@ -10,13 +10,19 @@
 /// (Reese and Govindjee 1998, A theory of finite viscoelasticity and numerical aspects; Simo 1987
 /// in small strains). A step takes the trial of the whole step times exp(-Δt/τ_m), by the
 /// exponential map of metals (laws/plastic_flow.hpp): exact at a fixed deformation, whatever
-/// Δt/τ_m, and of first order in Δt/τ_m in what a step itself deforms. What a step takes from the
-/// energy of springs is heat. A rotation of the body between two steps has no effect.
+/// Δt/τ_m, and of first order in Δt/τ_m in what a step itself deforms. A rotation of the body
+/// between two steps has no effect. Dashpots turn into heat
+///   ½ (S_before + S_after) : Δε_v = g_m μ (1 - e^{-Δt/τ_m}) |ε| (|ε_before| + e^{-Δt/τ_m} |ε|)
+/// of a step, with the spring's ε_before at its start and the trial ε, taken to be coaxial: all
+/// that the spring loses at a fixed deformation, and the rest of the work of forces at the ends of
+/// steps.
 ///
-/// Without a time step, in searches for equilibrium, branches have relaxed.
+/// In the endless time of a search for equilibrium branches relax, and in no time (Δt = 0) they do
+/// not.
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "phyxel/physics/laws/plastic_flow.hpp"
@@ -40,9 +46,12 @@ struct Maxwell {
        .low = 1e-6,
        .high = 1,
        .open = false,
-       .meaning = "Branches: share of the shear modulus that relaxes, by relaxation time [s]. The "
-                  "shares add up to less than 1. `young` and `poisson` are those of fast "
-                  "deformation; the bulk modulus does not relax.",
+       .meaning =
+           "Branches: share of the shear modulus that relaxes, by relaxation time [s]. The "
+           "shares add up to less than 1. `young` and `poisson` are those of fast "
+           "deformation; the bulk modulus does not relax. Verlet's steps are a twentieth of the "
+           "shortest time at most: what relaxes faster than the body moves is better "
+           "described by `viscosity`.",
        .points = branches,
        .starts_above_zero = true,
        .argument = "relaxation time",
@@ -71,30 +80,51 @@ struct Maxwell {
     return p[0] * (lasting > 0.1 ? lasting : 0.1);
   }
 
+  /// The shortest relaxation time [s].
+  static double shortest_time(std::span<const double> p) { return p[2]; }
   /// The longest relaxation time [s].
   static double longest_time(std::span<const double> p) { return p[2 * branches]; }
 
   static constexpr bool many_registers = true;
   static constexpr bool work_is_potential = false;  // of the rate
 
-  static constexpr HistoryNumber history[] = {
-      {"inverse_viscous_factor_1_xx", ""}, {"inverse_viscous_factor_1_yx", ""},
-      {"inverse_viscous_factor_1_yy", ""}, {"inverse_viscous_factor_1_zx", ""},
-      {"inverse_viscous_factor_1_zy", ""}, {"inverse_viscous_factor_1_zz", ""},
-      {"inverse_viscous_factor_2_xx", ""}, {"inverse_viscous_factor_2_yx", ""},
-      {"inverse_viscous_factor_2_yy", ""}, {"inverse_viscous_factor_2_zx", ""},
-      {"inverse_viscous_factor_2_zy", ""}, {"inverse_viscous_factor_2_zz", ""},
-      {"inverse_viscous_factor_3_xx", ""}, {"inverse_viscous_factor_3_yx", ""},
-      {"inverse_viscous_factor_3_yy", ""}, {"inverse_viscous_factor_3_zx", ""},
-      {"inverse_viscous_factor_3_zy", ""}, {"inverse_viscous_factor_3_zz", ""},
-      {"inverse_viscous_factor_4_xx", ""}, {"inverse_viscous_factor_4_yx", ""},
-      {"inverse_viscous_factor_4_yy", ""}, {"inverse_viscous_factor_4_zx", ""},
-      {"inverse_viscous_factor_4_zy", ""}, {"inverse_viscous_factor_4_zz", ""},
-      {"relaxation_work", "J/m^3"}};
+  static constexpr HistoryNumber history[] = {{"inverse_viscous_factor_1_xx", ""},
+                                              {"inverse_viscous_factor_1_yx", ""},
+                                              {"inverse_viscous_factor_1_yy", ""},
+                                              {"inverse_viscous_factor_1_zx", ""},
+                                              {"inverse_viscous_factor_1_zy", ""},
+                                              {"inverse_viscous_factor_1_zz", ""},
+                                              {"spring_strain_1", ""},
+                                              {"inverse_viscous_factor_2_xx", ""},
+                                              {"inverse_viscous_factor_2_yx", ""},
+                                              {"inverse_viscous_factor_2_yy", ""},
+                                              {"inverse_viscous_factor_2_zx", ""},
+                                              {"inverse_viscous_factor_2_zy", ""},
+                                              {"inverse_viscous_factor_2_zz", ""},
+                                              {"spring_strain_2", ""},
+                                              {"inverse_viscous_factor_3_xx", ""},
+                                              {"inverse_viscous_factor_3_yx", ""},
+                                              {"inverse_viscous_factor_3_yy", ""},
+                                              {"inverse_viscous_factor_3_zx", ""},
+                                              {"inverse_viscous_factor_3_zy", ""},
+                                              {"inverse_viscous_factor_3_zz", ""},
+                                              {"spring_strain_3", ""},
+                                              {"inverse_viscous_factor_4_xx", ""},
+                                              {"inverse_viscous_factor_4_yx", ""},
+                                              {"inverse_viscous_factor_4_yy", ""},
+                                              {"inverse_viscous_factor_4_zx", ""},
+                                              {"inverse_viscous_factor_4_zy", ""},
+                                              {"inverse_viscous_factor_4_zz", ""},
+                                              {"spring_strain_4", ""},
+                                              {"relaxation_work", "J/m^3"}};
   /// The history of a phyxel; all zero: never deformed.
   struct State {
-    PlasticFactor<Real> branch[branches];  ///< L of F_v⁻¹ of each branch.
-    Real relaxation_work{};                ///< Heat since the virgin state [J/m³].
+    /// A spring and its dashpot.
+    struct Branch : PlasticFactor<Real> {  // L of F_v⁻¹
+      Real strain{};                       ///< |ε_m| at the end of the last step.
+    };
+    Branch branch[branches];
+    Real relaxation_work{};  ///< Heat since the virgin state [J/m³].
   };
 
   Real lambda, mu;       ///< Lamé's parameters of the spring that stays, with all of K [Pa].
@@ -123,20 +153,22 @@ struct Maxwell {
   /// @param grad_u F - I at the end of the step
   /// @param state history at the start of the step; advanced to its end
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u, State& state, Real dt) const {
+    using std::sqrt;
     Mat3<Real> stress = lasting().first_piola_stress(grad_u);
     each_branch([&](int m) {
-      PlasticFactor<Real>& branch = state.branch[m];
+      auto& branch = state.branch[m];
       const HenckyStrain<Real> trial = strain_of(grad_u, branch);
       // A crushed or inverted spring (a stretch below s₀ of Hencky's law) does not relax, since
       // flow would enlarge a negative stretch; it recovers elastically.
       const Real least = smaller(smaller(trial.isolated.biot, trial.near.biot), trial.far.biot);
       const Real lost = where_larger(least, Real(LogarithmicStrain<Real>::least_stretch - 1),
-                                     relaxed(rate[m] * dt), Real(0));
+                                     -exp_minus_one(rate[m] * dt), Real(0));
+      const Real strain = sqrt(trial.deviator_squared()), left = strain - lost * strain;
       stress += stress_of(trial, branch, shear[m] - shear[m] * lost);
-      // |ε|² of the trial less that at the end.
-      const Real drop = lost * (Real(2) - lost) * trial.deviator_squared();
-      state.relaxation_work = fused(shear[m], drop, state.relaxation_work);
+      state.relaxation_work =
+          fused(shear[m] * lost * strain, branch.strain + left, state.relaxation_work);
       branch.flow(trial, lost);
+      branch.strain = left;
     });
     return stress;
   }
@@ -195,10 +227,6 @@ struct Maxwell {
   PHYXEL_HD static Mat3<Real> stress_of(const HenckyStrain<Real>& strain,
                                         const PlasticFactor<Real>& branch, Real modulus) {
     return branch.times_transpose(strain.first_piola_stress(Real(-2.0 / 3) * modulus, modulus));
-  }
-  /// 1 - exp(-x); 1 for x = 0, an endless time.
-  PHYXEL_HD static Real relaxed(Real times) {
-    return where_larger(times, Real(0), -exp_minus_one(times), Real(1));
   }
 };
 

@@ -55,8 +55,8 @@ struct WithViscosity {
   /// First Piola stress [Pa] at the end of a step.
   /// @param grad_u F - I at the end of the step
   /// @param state history at the start of the step; advanced to its end
-  /// @param dt length of the step [s]. If 0, there is no viscous stress, and the strain is stored
-  /// as the start of the next step
+  /// @param dt length of the step [s]. If 0 or `endless_time`, there is no viscous stress, and the
+  /// strain is stored as the start of the next step
   PHYXEL_HD Mat3<Real> first_piola_stress(const Mat3<Real>& grad_u, State& state, Real dt) const {
     const Sym3<Real> strain = green_strain(grad_u);
     const Sym3<Real> change = strain + Real(-1) * state.strain;
@@ -91,9 +91,10 @@ struct WithViscosity {
       return law.at_rest(Real(0));
     }
   }
-  /// 1/Δt [1/s]; 0 if Δt is 0.
+  /// 1/Δt [1/s]; 0 if Δt is 0, or endless.
   PHYXEL_HD static Real rate_of(Real dt) {
-    return where_larger(dt, Real(0), Real(1) / where_larger(dt, Real(0), dt, Real(1)), Real(0));
+    const Real rate = Real(1) / where_larger(dt, Real(0), dt, Real(1));
+    return where_larger(dt, Real(0), where_larger(Real(endless_time), dt, rate, Real(0)), Real(0));
   }
   /// s : e.
   PHYXEL_HD static Real work_of(const Mat3<Real>& s, const Sym3<Real>& e) {
