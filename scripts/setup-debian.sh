@@ -13,10 +13,11 @@ build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev 
        gnuplot-nox           # the figures of phyxel paper
        help2man dpkg-dev)    # the manual page, and packages
 # clang for sanitizers, fuzzers and static analysis, Doxygen for the reference, Python for the module and for independent
-# reading of files, Chromium for pages, fish and zsh for their completions, and parallel HDF5 beside the serial one.
+# reading of files, Chromium for pages, fish and zsh for their completions, parallel HDF5 beside the serial one, and CalculiX,
+# beside which phyxel is measured.
 tests=(ccache pkg-config clang-format clang-tidy doxygen libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev lld llvm
        python3-h5py python3-vtk9 python3-dev pybind11-dev python3-numpy python3-pytest
-       python3-matplotlib chromium fish zsh libhdf5-openmpi-dev)
+       python3-matplotlib chromium fish zsh libhdf5-openmpi-dev calculix-ccx)
 
 wanted=("${build[@]}")
 if [[ ${1-} == --tests ]]; then

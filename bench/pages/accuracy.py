@@ -3,7 +3,7 @@ hard` and the studies of `phyxel_studies`."""
 import math
 import re
 
-from pages import contact_peers
+from pages import calculix, contact_peers
 from pages.charts import Curve, LineChart
 from pages.page import Page, measured_by
 from pages.problems import problems
@@ -292,6 +292,7 @@ def make(results, link):
     if contact:
         summary_of_contact(page, contact)
     beside_lammps(page, results)
+    calculix.section(page, results)
     contact_peers.section(page, results)
     hourglass(page, results)
     styles = styles_of([table, contact] if contact else [table])

@@ -45,7 +45,7 @@ def made_of(name):
     beginnings = {"performance": ["gpu_sizes", "gpu_capacity", "gpu_small", "gpu_surfels", "gpu_neighbours",
                                   "gpu_cantilever", "gpu_terms", "gpu_contact", "gpu_setup", "gpu_profile", "gpu_bin"],
                   "scaling": ["gpu_ranks_", "cpu_ranks_", "gpu_sizes"],
-                  "accuracy": ["accuracy", "hard_cases_", "cpu_terms", "gpu_terms"],
+                  "accuracy": ["accuracy", "calculix", "hard_cases_", "cpu_terms", "gpu_terms"],
                   "laws": ["laws"],
                   "contact": ["contact_examples"],
                   "cpu": ["cpu_step", "cpu_neighbours", "lammps_tlsph"]}[name]

@@ -167,7 +167,7 @@ def test_the_problems_are_those_of_the_program(tmp_path):
 
 #: What chooses rows and sections, and so must stay.
 KEYS = {"case", "lattice", "partitioner", "cut_by", "terms", "shape", "kernel", "metric", "precision", "bodies", "threads", "ranks",
-        "program", "discretisation", "quantity", "part", "law"}
+        "program", "discretisation", "quantity", "part", "law", "mesh", "solver"}
 
 
 @pytest.mark.parametrize("name", MAKERS)

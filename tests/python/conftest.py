@@ -1,6 +1,7 @@
-"""Skips are counted, and in CI a module that is missing is a failure: see tests/support/skips.hpp."""
+"""Skips are counted, and in CI a module or a tool that is missing is a failure: see tests/support/skips.hpp."""
 import importlib.util
 import os
+import shutil
 
 import pytest
 
@@ -9,13 +10,23 @@ def in_ci():
     return os.environ.get("CI", "") not in ("", "0", "false")
 
 
-def needs_module(name):
-    """Skips the test where a Python module is missing; fails it in CI."""
-    if importlib.util.find_spec(name):
+def needs(found, name):
+    """Skips the test where a tool has not been found; fails it in CI."""
+    if found:
         return
     if in_ci():
-        pytest.fail(f"missing tool: Python's {name} (CI is set)")
-    pytest.skip(f"missing tool: Python's {name}")
+        pytest.fail(f"missing tool: {name} (CI is set)")
+    pytest.skip(f"missing tool: {name}")
+
+
+def needs_module(name):
+    """Skips the test where a Python module is missing; fails it in CI."""
+    needs(importlib.util.find_spec(name), f"Python's {name}")
+
+
+def needs_program(name):
+    """Skips the test where a program is not on the path; fails it in CI."""
+    needs(shutil.which(name), name)
 
 
 def pytest_runtest_logreport(report):
