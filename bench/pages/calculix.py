@@ -92,8 +92,13 @@ def least(found, program, level, column, only=""):
     return min(reached, default=None)
 
 
-def shown(cost, digits=2):
-    return f"{'≤ ' if cost[1] else ''}{cost[0]:.{digits}g}" if cost else "–"
+def two_digits(value):
+    """A positive number with two significant digits, or to a whole number."""
+    return f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
+
+
+def shown(cost):
+    return f"{'≤ ' if cost[1] else ''}{two_digits(cost[0])}" if cost else "–"
 
 
 def ratio(own, peer):
@@ -101,8 +106,7 @@ def ratio(own, peer):
     if not own or not peer:
         return "–"
     value = own[0] / peer[0]
-    text = f"{value:.2g}" if value < 99.5 else f"{value:.0f}"
-    return f"**{text}**" if value < 1 else text
+    return f"**{two_digits(value)}**" if value < 1 else two_digits(value)
 
 
 def in_words(ratios):
@@ -113,7 +117,7 @@ def in_words(ratios):
     for who, factors in (("CalculiX", slower), ("phyxel", faster)):
         if factors:
             (few, _), (most, where) = min(factors), max(factors)
-            few, most = f"{few:.2g}", f"{most:.2g}"
+            few, most = two_digits(few), two_digits(most)
             by = f"by a factor of {most}" if few == most else f"by factors of {few} to {most} (the largest in *{where}*)"
             said.append(f"{who} in {len(factors)} of {len(ratios)} rows, {by}")
     return ", ".join(said)
@@ -121,7 +125,7 @@ def in_words(ratios):
 
 def table_of_least(page, table, quantities):
     """Adds the table of the least costs, and its summary."""
-    cells, times, uniform_times, memory, missed = [], [], [], [], dict.fromkeys(PROGRAMS, 0)
+    cells, times, uniform_times, memory, missed = [], [], [], [], dict.fromkeys((*PROGRAMS, "uniform"), 0)
     for case, quantity in quantities:
         found = families(table, case, quantity)
         for level in LEVELS:
@@ -131,8 +135,8 @@ def table_of_least(page, table, quantities):
             for kept, a, b in ((times, own, peer), (uniform_times, own, uniform), (memory, own_memory, peer_memory)):
                 if a and b:
                     kept.append((a[0] / b[0], f"{case}: {quantity}"))
-            missed["CalculiX"] += peer is None
-            missed["phyxel"] += own is None
+            for who, cost in (("CalculiX", peer), ("uniform", uniform), ("phyxel", own)):
+                missed[who] += cost is None
             cells.append([f"{case}: {quantity}", f"{100 * level:g}%", f"{shown(peer)} ({peer[2]})" if peer else "–", shown(uniform),
                           f"{shown(own)} ({own[2]})" if own else "–", ratio(own, peer), shown(peer_memory), shown(own_memory),
                           ratio(own_memory, peer_memory)])
@@ -142,7 +146,7 @@ def table_of_least(page, table, quantities):
         if ratios:
             page.add(f"- {name}: {in_words(ratios)}.\n")
     page.paragraph(f"- Not reached at the sizes measured: {missed['CalculiX']} of {len(cells)} rows by CalculiX, "
-                   f"{missed['phyxel']} by phyxel.")
+                   f"{missed['uniform']} by CalculiX on uniform meshes, {missed['phyxel']} by phyxel.")
     page.add(markdown_table(["", "error", "CalculiX, CPU s", "uniform", "phyxel, CPU s", "ratio", "CalculiX, MiB", "phyxel, MiB",
                              "ratio"], cells))
 
