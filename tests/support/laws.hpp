@@ -1,6 +1,7 @@
 /// Materials of every law, and a caller's law with known results.
 #pragma once
 
+#include <algorithm>
 #include <cstring>
 #include <span>
 #include <string>
@@ -29,6 +30,12 @@ inline Material rubber_of(const std::string& law) {
     }
   }
   return material;
+}
+
+/// True if the law of a part of a model relaxes: its heat is viscous work, too.
+inline bool relaxes(const Model& model) {
+  return std::any_of(model.parts.begin(), model.parts.end(),
+                     [](const Part& part) { return part.material.law == Maxwell<double>::name; });
 }
 
 /// A law of the list with the parameters of a material.

@@ -234,8 +234,7 @@ std::vector<AccuracyCase> contact_cases() {
            "at 0.5 m/s, so that all its points slide although its own weight, which acts at once, "
            "makes it swing; its viscosity damps the vibrations that friction makes grow. "
            "Reference: v t + ½ g (sin 30° - 0.3 cos 30°) t². The difference that remains is that "
-           "of "
-           "a block which its weight compresses, and so it has no order.",
+           "of a block which its weight compresses, and so it has no order.",
        .across = {4, 6, 8},
        .solve = slope,
        .hourglass = {0.1},
