@@ -236,6 +236,15 @@ bool has_parameter(std::string_view law, std::string_view parameter) {
   return false;
 }
 
+std::string laws_with(std::string_view parameter) {
+  std::string names;
+  for (const LawEntry& law : law_table()) {
+    if (!has_parameter(law.name, parameter)) continue;
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : " or ", law.name);
+  }
+  return names;
+}
+
 ChosenLaw chosen_law(const Material& material) {
   ChosenLaw chosen;
   chosen.index = index_of(material.law);

@@ -28,8 +28,8 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
       if (!is_it) {
         if (!table.has(parameter.name) || has_parameter(material.law, name)) continue;
         table.refuse(parameter.name,
-                     fmt::format("found, which law \"{}\" does not have; allowed with law = \"{}\"",
-                                 material.law, entry.name));
+                     fmt::format("found, which law \"{}\" does not have; allowed with law = {}",
+                                 material.law, laws_with(name)));
       }
       const bool has_bodys = inherits && has_parameter(of_body, name);
       if (parameter.required() && !has_bodys) table.expect(parameter.name);

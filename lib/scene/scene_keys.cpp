@@ -47,16 +47,6 @@ std::string field_meanings() {
   return all + ". The surface has them, too, but for velocity, mass and volume.";
 }
 
-/// The laws that have a parameter: "j2", or "j2" or "clay".
-std::string laws_with(std::string_view parameter) {
-  std::string names;
-  for (const LawEntry& law : law_table()) {
-    if (!has_parameter(law.name, parameter)) continue;
-    names += fmt::format("{}\"{}\"", names.empty() ? "" : " or ", law.name);
-  }
-  return names;
-}
-
 /// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share
 /// a parameter share its key.
 std::vector<SceneKey> law_keys(const std::string& section) {

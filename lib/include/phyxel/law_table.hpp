@@ -43,6 +43,9 @@ ParameterValue typical_value(const LawParameter& parameter, double scale = 1);
 /// True if there is a law of this name and it has this parameter; "" is `usual_law`.
 bool has_parameter(std::string_view law, std::string_view parameter);
 
+/// The laws that have a parameter, in words: "j2" or "clay", in quotes.
+std::string laws_with(std::string_view parameter);
+
 /// A material's law, ready for a kernel.
 struct ChosenLaw {
   int index = 0;  ///< Index in `Laws`.
