@@ -48,8 +48,8 @@ one() {
   done
 }
 if has contact; then
-  step gpu_contact_obstacle step --phyxels 1000000 --terms green,obstacle --precision float
-  step gpu_contact_bodies step --phyxels 500000 --bodies 2 --terms green,contact --precision float
+  step gpu_contact_obstacle step --phyxels 1000000 --terms green,obstacle --precision float --seconds 1
+  step gpu_contact_bodies step --phyxels 500000 --bodies 2 --terms green,contact --precision float --seconds 1
   one gpu_contact gpu_contact_obstacle gpu_contact_bodies
 fi
 if has small; then
