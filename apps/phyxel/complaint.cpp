@@ -157,6 +157,8 @@ class Words {
       path_ += " " + word;
       return {};
     }
+    const auto takes_words = [](const CLI::Option* option) { return option->get_positional(); };
+    if (!command_->get_options(takes_words).empty()) return {};
     for (std::string& name : options_of(*command_)) known.push_back(std::move(name));
     return fmt::format("{}: unknown command{}; {} --help lists them", word, meant(word, known),
                        path_);

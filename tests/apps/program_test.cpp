@@ -269,6 +269,8 @@ TEST_F(Program, WrongInputEndsWithCode2AndNamesTheCulprit) {
   } cases[] = {
       {{}, "phyxel: error: A subcommand is required; phyxel --help explains\n"},
       {{"frobnicate"}, "phyxel: error: frobnicate: unknown command; phyxel --help lists them\n"},
+      {{"accuracy", "strap", "--across", "1"},
+       "phyxel: error: --across 1: Value 1 not in range 2 to 200\n"},
       {{"run", "thin.toml"},
        "phyxel: error: thin.toml:3:1: body \"flat\": flat.obj: the surface encloses no volume: "},
       {{"run", "beam.toml", "--dry-run", "--step", "1"},
