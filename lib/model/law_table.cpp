@@ -189,6 +189,18 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
   return values;
 }
 
+/// A time [s] of a material's law; 0 for a caller's law.
+/// @param of_law called as of_law<Law>(values), where values() returns the parameters
+template <class OfLaw>
+double time_of_law(const Material& material, OfLaw&& of_law) {
+  if (material.custom_law) return 0;
+  const int index = index_of(material.law);
+  const auto values = [&] { return values_of(law_table()[index], material); };
+  return Laws::with_type<double>(index, [&]<class Law>(std::type_identity<Law>) {
+    return of_law.template operator()<Law>(values);
+  });
+}
+
 }  // namespace
 
 ParameterValue::Curve ParameterValue::curve() const {
@@ -291,26 +303,16 @@ double hourglass_modulus(const Material& material) {
 }
 
 double shortest_time(const Material& material) {
-  if (material.custom_law) return 0;
-  const int index = index_of(material.law);
-  return Laws::with_type<double>(index, [&]<class Law>(std::type_identity<Law>) {
-    if constexpr (requires(std::vector<double> v) { Law::shortest_time(v); }) {
-      return Law::shortest_time(values_of(law_table()[index], material));
-    } else {
-      return 0.0;
-    }
+  return time_of_law(material, []<class Law>(const auto& values) {
+    if constexpr (requires { Law::shortest_time(values()); }) return Law::shortest_time(values());
+    return 0.0;
   });
 }
 
 double longest_time(const Material& material) {
-  if (material.custom_law) return 0;
-  const int index = index_of(material.law);
-  return Laws::with_type<double>(index, [&]<class Law>(std::type_identity<Law>) {
-    if constexpr (requires(std::vector<double> v) { Law::longest_time(v); }) {
-      return Law::longest_time(values_of(law_table()[index], material));
-    } else {
-      return 0.0;
-    }
+  return time_of_law(material, []<class Law>(const auto& values) {
+    if constexpr (requires { Law::longest_time(values()); }) return Law::longest_time(values());
+    return 0.0;
   });
 }
 

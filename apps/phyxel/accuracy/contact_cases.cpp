@@ -8,7 +8,6 @@
 #include "accuracy/round_bodies.hpp"
 #include "accuracy/touching.hpp"
 #include "phyxel/contacts.hpp"
-#include "phyxel/equilibrium.hpp"
 #include "phyxel/physics/laws.hpp"
 
 namespace phyxel::app {
@@ -50,22 +49,11 @@ std::vector<Quantity> of_pressed_ball(const Model& model, Backend& backend, Vec3
 
 /// Solves for the pressed ball at rest by Newton's method.
 Solution hertz(const Discretisation& d) {
-  const auto begin = Clock::now();
-  const Scene scene = pressed_ball(d, 1);
-  const Cloud cloud = eighth_of_ball(d, pressed_radius);
-  const Model model = build_model(scene, std::span(&cloud, 1));
-  const auto backend = make_cpu_backend(model, Precision::double_);
-  Solver solver(model, *backend, initial_state(model, scene, 1), Method::equilibrium);
-  Solution solution{.phyxels = model.size(),
-                    .neighbours = static_cast<double>(model.pairs()) / model.size(),
-                    .setup_seconds = seconds_since(begin)};
-  const auto start = Clock::now();
-  solver.step();
-  const Vec3d force = find_contacts(model, *backend, solver).at(0).force;
-  solution.seconds = seconds_since(start);
-  solution.evaluations = solver.work().evaluations;
-  solution.found = of_pressed_ball(model, *backend, force);
-  return solution;
+  return solve_at_rest(
+      pressed_ball(d, 1), [&] { return eighth_of_ball(d, pressed_radius); },
+      [](const Model& model, Backend& backend, const Solver& solver) {
+        return of_pressed_ball(model, backend, find_contacts(model, backend, solver).at(0).force);
+      });
 }
 
 /// Solves for the pressed ball by damped Verlet steps.

@@ -1,5 +1,4 @@
 /// Problems of contact in plane strain: a cylinder between planes, and a strap on a drum.
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -7,8 +6,6 @@
 #include "accuracy/bar.hpp"
 #include "accuracy/round_bodies.hpp"
 #include "accuracy/touching.hpp"
-#include "phyxel/contacts.hpp"
-#include "phyxel/equilibrium.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -25,15 +22,13 @@ void hold_along_z(BodyRequest& body) {
 
 constexpr double pressed_radius = 0.1;  // of a cylinder [m]
 
-/// The line load on half of the width of contact of a cylinder that planes press, and the half
-/// width: of Hertz, and the approach of a plane to the axis (Johnson 1985, Contact mechanics, 4.4
-/// and 5.6).
+/// Hertz's contact of a cylinder with a plane, by its line load, and the approach of the plane to
+/// the cylinder's axis (Johnson 1985, Contact mechanics, 4.2 and 5.6).
 struct LineContact {
   double load;  ///< P' [N/m]
 
   static constexpr double modulus = E / (1 - nu * nu);  ///< E* [Pa]
   double half_width() const { return std::sqrt(4 * load * pressed_radius / (pi * modulus)); }
-  double pressure() const { return 2 * load / (pi * half_width()); }  ///< The largest one [Pa].
   /// The approach [m] of a plane to the axis.
   double approach() const {
     return load / (pi * modulus) * (2 * std::log(4 * pressed_radius / half_width()) - 1);
@@ -51,7 +46,6 @@ struct LineContact {
 
 /// Solves for a quarter of a cylinder that a plane presses, at rest by Newton's method.
 Solution cylinder(const Discretisation& d) {
-  const auto begin = Clock::now();
   constexpr double approach = 0.03 * pressed_radius;
   Scene scene;
   BodyRequest body = contact_body(d, "cylinder", nu);
@@ -62,31 +56,23 @@ Solution cylinder(const Discretisation& d) {
   }
   scene.bodies.push_back(body);
   scene.obstacles.push_back(ram({0, -1, 0}, {0, pressed_radius, 0}, {0, -approach, 0}, 1));
-  const Cloud cloud = quarter_of_cylinder(d, pressed_radius);
-  const Model model = build_model(scene, std::span(&cloud, 1));
-  const auto backend = make_cpu_backend(model, Precision::double_);
-  Solver solver(model, *backend, initial_state(model, scene, 1), Method::equilibrium);
-  Solution solution{.phyxels = model.size(),
-                    .neighbours = static_cast<double>(model.pairs()) / model.size(),
-                    .setup_seconds = seconds_since(begin)};
-  const auto start = Clock::now();
-  solver.step();
-  solution.seconds = seconds_since(start);
-  solution.evaluations = solver.work().evaluations;
-  std::vector<Vec3d> force;
-  backend->internal_forces(force);
-  // At rest the internal forces of free phyxels are those of contact, with the other sign.
-  double load = 0, second = 0;
-  for (Index i = 0; i < model.size(); ++i) {
-    const Vec3d& x = model.position[i];
-    if (x.y < 0.5 * pressed_radius) continue;
-    load += force[i].y, second += force[i].y * x.x * x.x;
-  }
-  const LineContact found{2 * load / thickness_of_slice(d, pressed_radius)};
-  solution.found = {{"force", found.load, LineContact::with_approach(approach).load},
-                    // A semi-ellipse of half width b has the second moment P' b²/4.
-                    {"half width", 2 * std::sqrt(second / load), found.half_width()}};
-  return solution;
+  const auto find = [&](const Model& model, Backend& backend, const Solver&) {
+    std::vector<Vec3d> force;
+    backend.internal_forces(force);
+    // At rest the internal forces of free phyxels are those of contact, with the other sign.
+    double load = 0, second = 0;
+    for (Index i = 0; i < model.size(); ++i) {
+      const Vec3d& x = model.position[i];
+      if (x.y < 0.5 * pressed_radius) continue;
+      load += force[i].y, second += force[i].y * x.x * x.x;
+    }
+    const LineContact found{2 * load / thickness_of_slice(d, pressed_radius)};
+    // A semi-ellipse of half width b has the second moment P' b²/4.
+    return std::vector<Quantity>{{"force", found.load, LineContact::with_approach(approach).load},
+                                 {"half width", 2 * std::sqrt(second / load), found.half_width()}};
+  };
+  return solve_at_rest(
+      scene, [&] { return quarter_of_cylinder(d, pressed_radius); }, find);
 }
 
 /// Pulls a strap over half of a drum until all of it slides.
@@ -124,10 +110,10 @@ Solution strap(const Discretisation& d) {
   // are over the swings of the last tenth.
   double pull_force = 0;
   int looks = 0;
+  std::vector<Vec3d> force;
   while (strap.solver().time() < duration) {
     strap.solver().step();
     if (strap.solver().time() < 0.9 * duration) continue;
-    std::vector<Vec3d> force;
     strap.backend().internal_forces(force);
     for (Index i = 0; i < strap.model().size(); ++i) {
       const Vec3d& x = strap.model().position[i];

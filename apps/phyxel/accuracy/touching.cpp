@@ -59,6 +59,25 @@ Solution Touching::solution(std::vector<Quantity> found) const {
           .found = std::move(found)};
 }
 
+Solution solve_at_rest(
+    const Scene& scene, const std::function<Cloud()>& cloud,
+    const std::function<std::vector<Quantity>(const Model&, Backend&, const Solver&)>& find) {
+  const auto begin = Clock::now();
+  const Cloud points = cloud();
+  const Model model = build_model(scene, std::span(&points, 1));
+  const auto backend = make_cpu_backend(model, Precision::double_);
+  Solver solver(model, *backend, initial_state(model, scene, 1), Method::equilibrium);
+  Solution solution{.phyxels = model.size(),
+                    .neighbours = static_cast<double>(model.pairs()) / model.size(),
+                    .setup_seconds = seconds_since(begin)};
+  const auto start = Clock::now();
+  solver.step();
+  solution.found = find(model, *backend, solver);
+  solution.seconds = seconds_since(start);
+  solution.evaluations = solver.work().evaluations;
+  return solution;
+}
+
 BodyRequest contact_body(const Discretisation& d, const char* name, double poisson) {
   BodyRequest body;
   body.name = name;

@@ -48,6 +48,12 @@ class Touching {
   std::unique_ptr<Solver> solver_;
 };
 
+/// Solves for the rest of a scene of one body by Newton's method, in double.
+/// @param find returns the quantities of the state at rest
+Solution solve_at_rest(
+    const Scene& scene, const std::function<Cloud()>& cloud,
+    const std::function<std::vector<Quantity>(const Model&, Backend&, const Solver&)>& find);
+
 /// A body with the material and the terms of a contact problem, without a source.
 BodyRequest contact_body(const Discretisation& d, const char* name, double poisson);
 /// A plane as an obstacle.

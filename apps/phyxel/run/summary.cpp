@@ -28,8 +28,8 @@ double rounding_energy(const Model& model) {
   return energy;
 }
 
-/// The energy that gravity gives all bodies from rest in a step of `dt` [J]: by as much contact
-/// lifts bodies that start on something.
+/// The energy that gravity gives all bodies from rest in a step of `dt` [J]. Contact lifts bodies
+/// that start at rest on an obstacle or on each other by as much.
 double energy_of_first_step(const Model& model, double dt) {
   double mass = 0;
   for (const Part& part : model.parts) mass += part.mass;
@@ -225,9 +225,10 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
         "conserves energy: do not trust the result; a smaller time.safety may help",
         100 * energy_drift(now)));
   }
+  const double least = std::max(0.01 * peak_energy_,
+                                rounding_energy(model()) + energy_of_first_step(model(), plan_.dt));
   const auto warn_of_energy = [&](const std::string& what, double made) {
-    const double least = rounding_energy(model()) + energy_of_first_step(model(), plan_.dt);
-    if (!(made > std::max(0.01 * peak_energy_, least))) return;
+    if (!(made > least)) return;
     warnings.push_back(fmt::format(
         "{} has made {:.3g} J, {:.2g}% of the largest kinetic + elastic energy: do not trust the "
         "result; a smaller time.safety may help",
@@ -248,7 +249,8 @@ std::vector<std::string> Run::warnings_of(const Diagnostics& now) const {
     const double steps = longest_time(part.material) / plan_.dt;
     if (scene_.solver.precision == Precision::double_ || !(steps > most_steps_of_history)) continue;
     warnings.push_back(fmt::format(
-        "body \"{}\" relaxes in {:.2g} steps, and what a step changes is lost to rounding in {}: "
+        "body \"{}\" relaxes in {:.2g} steps, and rounding in {} loses the change of a single "
+        "step: "
         "allowed: up to {:g} steps, or precision double",
         part.name, steps, precision_name(scene_.solver.precision), most_steps_of_history));
   }
