@@ -95,11 +95,10 @@ TEST_F(Mpirun, KilledRankEndsAllAndTheLastCheckpointIsWhole) {
   std::optional<fs::path> checkpoint;
   // The first one is of the start.
   const fs::path first = folder_ / "out" / "checkpoint_000000000.h5";
-  for (int wait = 0; wait < 4000 && checkpoint.value_or(first) == first; ++wait) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  ASSERT_TRUE(comes_true([&] {
     checkpoint = latest_checkpoint(folder_ / "out");
-  }
-  ASSERT_NE(checkpoint.value_or(first), first);
+    return checkpoint.value_or(first) != first;
+  }));
   const std::vector<pid_t> ranks = children_of(mpirun);
   ASSERT_GE(ranks.size(), 2u);
   kill(ranks.back(), SIGKILL);

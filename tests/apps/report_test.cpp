@@ -256,10 +256,11 @@ TEST_F(Reports, ARunsSummaryIsOfItsEnd) {
   EXPECT_TRUE(json::accept(odd.out));
   // Killed on its way: what the folder had at the last end is not of this one.
   const pid_t child = start({"run", "beam.toml", "--until", "5000", "--resume", "auto"});
-  for (int wait = 0; wait < 4000 && fs::exists(folder_ / "out" / "run.json"); ++wait) usleep(5000);
+  const auto begun = [&] { return !fs::exists(folder_ / "out" / "run.json"); };
+  EXPECT_TRUE(comes_true(begun));
   kill(child, SIGKILL);
-  finish(child);
-  EXPECT_FALSE(fs::exists(folder_ / "out" / "run.json"));
+  const Outcome killed = finish(child);
+  EXPECT_EQ(killed.code, 128 + SIGKILL) << killed.err;
 }
 
 TEST_F(Reports, OneFamilyAloneIsShown) {

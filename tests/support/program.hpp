@@ -44,12 +44,20 @@ class Program : public Folder {
   }
   Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
 
-  /// Waits until a file appears in the test's folder.
-  void wait_for(const std::string& file) const {
-    for (int wait = 0; wait < 4000 && !std::filesystem::exists(folder_ / file); ++wait) {
+  /// Waits until a condition holds. Two minutes are a hundred times what a machine with other work
+  /// needs.
+  template <class Condition>
+  static bool comes_true(const Condition& condition) {
+    constexpr int polls = 24000;
+    for (int poll = 0; poll < polls && !condition(); ++poll) {
       std::this_thread::sleep_for(std::chrono::milliseconds(5));
     }
-    EXPECT_TRUE(std::filesystem::exists(folder_ / file));
+    return condition();
+  }
+
+  /// Waits until a file appears in the test's folder.
+  void wait_for(const std::string& file) const {
+    EXPECT_TRUE(comes_true([&] { return std::filesystem::exists(folder_ / file); }));
   }
 
   /// Starts the program, and sends it a signal once it has written a file.
