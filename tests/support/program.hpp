@@ -44,6 +44,13 @@ class Program : public Folder {
   }
   Outcome run(const std::vector<std::string>& arguments) const { return finish(start(arguments)); }
 
+  /// True once a child has ended, which `finish` still is for.
+  static bool has_ended(pid_t child) {
+    siginfo_t info{};
+    return waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOHANG | WNOWAIT) == 0 &&
+           info.si_pid == child;
+  }
+
   /// Waits until a condition holds. Two minutes are a hundred times what a machine with other work
   /// needs.
   template <class Condition>
