@@ -5,6 +5,7 @@
 #include "model/assembly.hpp"
 #include "model/body_contact.hpp"
 #include "model/contact.hpp"
+#include "model/fracture.hpp"
 #include "model/owned_vectors.hpp"
 #include "model/space_filling_curve.hpp"
 #include "mpi/halo_transport.hpp"
@@ -122,6 +123,7 @@ BuiltShare share_out_of(const ShareSetup& setup, WholeBodies& whole, const Cut& 
   close_share(whole, built.model, areas, setup.options.close);
   setup.ranks.collectively([&] { built.model.obstacles = obstacles_of(setup.scene); });
   if (!contact_offset.empty()) add_contact(setup, whole, contact_offset, built.model);
+  setup.ranks.collectively([&] { find_fracture(built.model, setup.scene); });
   add_warnings(built.model, surfels);
   built.partitioner = cut.partitioner;
   built.quality = cut.quality;

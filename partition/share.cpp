@@ -131,6 +131,8 @@ class Maker {
     m.volume = own_of(whole_.volume);
     m.mass = own_of(whole_.mass);
     if (!whole_.closing.empty()) m.closing = own_of(whole_.closing);
+    m.fracture = whole_.fracture;
+    if (whole_.fracture.breaks) m.fracture.growth = own_of(whole_.fracture.growth);
     hood.support = own_of(whole_.neighbourhood.support);
     if (!has_lists_) return;
     m.inverse_moment = own_of(whole_.inverse_moment);

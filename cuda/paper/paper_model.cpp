@@ -109,6 +109,7 @@ void check_paper_model(const Model& model) {
     throw InputError("the 2008 kernels: " + what);
   };
   check_model(model);
+  if (model.fracture.acts()) refuse("a body that breaks, or has notches; allowed: neither");
   if (model.has_inclusions()) refuse("a body of several materials; allowed: one");
   if (model.parts.size() != 1) {
     refuse(fmt::format("{} bodies in one model; allowed: one body per launch", model.parts.size()));

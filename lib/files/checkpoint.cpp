@@ -107,6 +107,57 @@ std::vector<RigidState> rigid_in(const Hdf5Reader& in) {
   return states;
 }
 
+constexpr const char* broken_path = "/state/broken";
+
+/// The broken pairs; none in files without any.
+std::vector<PhyxelPair> broken_in(const Hdf5Reader& in, std::size_t phyxels) {
+  std::vector<PhyxelPair> pairs;
+  if (!in.has(broken_path)) return pairs;
+  const std::vector<Index> ids = in.array<Index>(broken_path, 2);
+  for (std::size_t k = 0; k < ids.size(); k += 2) {
+    const PhyxelPair pair{ids[k], ids[k + 1]};
+    const bool fits = pair[0] >= 0 && pair[0] < pair[1] &&
+                      static_cast<std::size_t>(pair[1]) < phyxels &&
+                      (pairs.empty() || pairs.back() < pair);
+    if (!fits) {
+      in.refuse(
+          fmt::format("{} has the pair {}, {} in row {}; allowed: ascending pairs of two of "
+                      "{} phyxels, the smaller number first",
+                      broken_path, pair[0], pair[1], k / 2, phyxels));
+    }
+    pairs.push_back(pair);
+  }
+  return pairs;
+}
+
+constexpr const char* worn_path = "/state/worn";
+constexpr const char* carried_path = "/state/worn_carried";
+
+/// The worn phyxels; none in files without any.
+std::vector<WornPhyxel> worn_in(const Hdf5Reader& in, std::size_t phyxels) {
+  std::vector<WornPhyxel> worn;
+  if (!in.has(worn_path)) return worn;
+  const std::vector<Index> ids = in.array<Index>(worn_path);
+  const std::vector<double> carried = in.array<double>(carried_path);
+  if (carried.size() != ids.size()) {
+    in.refuse(fmt::format("{} has {} values; allowed: {}, as {} has", carried_path, carried.size(),
+                          ids.size(), worn_path));
+  }
+  for (std::size_t k = 0; k < ids.size(); ++k) {
+    const bool fits = ids[k] >= 0 && static_cast<std::size_t>(ids[k]) < phyxels &&
+                      (worn.empty() || worn.back().phyxel < ids[k]) && carried[k] >= 0 &&
+                      carried[k] < 1;
+    if (!fits) {
+      in.refuse(
+          fmt::format("{} and {} have phyxel {} with {} in row {}; allowed: ascending numbers "
+                      "of {} phyxels, with shares from 0 to below 1",
+                      worn_path, carried_path, ids[k], carried[k], k, phyxels));
+    }
+    worn.push_back({ids[k], carried[k]});
+  }
+  return worn;
+}
+
 std::string history_path(const std::string& column) { return "/state/history/" + column; }
 
 /// The lines of a text.
@@ -222,6 +273,21 @@ fs::path write_checkpoint(const fs::path& directory, const State& state, const C
     }
     out.array<double>(rigid_path, numbers, RigidState::count);
   }
+  if (!state.broken.empty()) {
+    std::vector<Index> ids;
+    for (const PhyxelPair& pair : state.broken) ids.insert(ids.end(), pair.begin(), pair.end());
+    out.array<Index>(broken_path, ids, 2);
+  }
+  if (!state.worn.empty()) {
+    std::vector<Index> ids;
+    std::vector<double> carried;
+    for (const WornPhyxel& of_state : state.worn) {
+      ids.push_back(of_state.phyxel);
+      carried.push_back(of_state.carried);
+    }
+    out.array<Index>(worn_path, ids);
+    out.array<double>(carried_path, carried);
+  }
 
   fs::path file = directory / fmt::format("{}{:09d}{}", prefix, state.step, suffix);
   write_sealed(file, kind, out.content(), Durable::yes);
@@ -295,6 +361,8 @@ CheckpointReader::CheckpointReader(const fs::path& file) {
     }
     state_.step_sums = work_in(in, in.text("/state/support_work"));
     state_.rigid = rigid_in(in);
+    state_.broken = broken_in(in, rows);
+    state_.worn = worn_in(in, rows);
     for (std::string& name : lines_of(in.text("/state/history_columns"))) {
       const std::string path = history_path(name);
       if (const std::size_t other = in.shape(path).rows; other != rows) {

@@ -163,6 +163,7 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
       {"viscous_work", "J", [](D d) { return d.viscous_work; }},
       {"contact_loss", "J", [](D d) { return d.contact_loss; }},
       {"contact_energy", "J", [](D d) { return d.contact_energy; }},
+      {"fracture_energy", "J", [](D d) { return d.fracture_energy; }},
       {"gravity_energy", "J", [](D d) { return d.gravity_energy; }},
       {"load_energy", "J", [](D d) { return d.load_energy; }},
       {"total_energy", "J", [](D d) { return d.total_energy(); }},

@@ -6,8 +6,9 @@
 #include <numbers>
 
 #include "model/closing_areas.hpp"
+#include "model/fracture.hpp"
 #include "model/parts.hpp"
-#include "model/row_weights.hpp"
+#include "model/row_moment.hpp"
 #include "model/selection.hpp"
 #include "phyxel/body_file.hpp"
 #include "phyxel/custom_law.hpp"
@@ -65,7 +66,7 @@ bool needs_lists_on_host(const BodyRequest& request) {
   const bool may_have_spacing = request.source.grading || !request.source.cloud.empty() ||
                                 (!request.source.file.empty() && has_spacing(request.source.file));
   const bool pairwise = rule.resolved(may_have_spacing).pairwise();
-  return !request.inclusions.empty() || may_be_cut || pairwise;
+  return !request.inclusions.empty() || !request.notches.empty() || may_be_cut || pairwise;
 }
 
 bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud) {
@@ -83,6 +84,7 @@ void check_terms(const BodyRequest& request) {
   };
   check_law(request.material);
   for (const InclusionRequest& inclusion : request.inclusions) check_law(inclusion.material);
+  check_fracture(request);
   const NeighbourhoodRule& rule = request.neighbourhood;
   if (rule.support == NeighbourhoodRule::Support::pairwise &&
       (rule.max_neighbours || rule.radius)) {
@@ -259,20 +261,15 @@ void find_moments(Model& model) {
   stage.expect(static_cast<std::size_t>(n / part));
 #pragma omp parallel for schedule(static)
   for (Index i = 0; i < n; ++i) {
-    Sym3d moment;
-    Vec3d offset;
     const double h = model.neighbourhood.support[i];
-    const RowWeights weights(model.neighbourhood.support.data(), i, part_of(model, i).pair_length);
-    for (const Index j : model.neighbourhood.neighbours.row(i)) {
+    const RowMoment sums = moment_of_row(model, i, [&](Index j) {
       const Vec3d x = model.position[j] - model.position[i];
-      const double w = weights(j, dot(x, x));
-      moment += moment_term(x, w);
-      offset += w * x;
       if (dot(x, x) <= 1e-20 * h * h) coincident[i] = 1;
-    }
-    const PseudoInverse<double> inverse = pseudo_inverse(moment);
+      return true;
+    });
+    const PseudoInverse<double> inverse = pseudo_inverse(sums.moment);
     model.inverse_moment[i] = inverse.matrix;
-    model.moment_offset[i] = offset;
+    model.moment_offset[i] = sums.offset;
     rank[i] = static_cast<signed char>(inverse.rank);
     if ((i + 1) % part == 0) stage.count();
   }

@@ -13,6 +13,7 @@
 #include "model/contact.hpp"
 #include "model/device_setup.hpp"
 #include "model/following.hpp"
+#include "model/fracture.hpp"
 #include "model/growing_arrays.hpp"
 #include "model/host_memory.hpp"
 #include "model/inclusions.hpp"
@@ -82,6 +83,12 @@ void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kerne
     throw InputError(fmt::format(
         "{}: a support of body \"{}\" ends inside the body, and its phyxels are parted from others "
         "in lists of neighbours on the host: allowed is a model built without a surveyor",
+        request.where, request.name));
+  }
+  if (!request.notches.empty()) {
+    throw InputError(fmt::format(
+        "{}: body \"{}\" has notches, which cut pairs in lists of neighbours on the host: allowed "
+        "is a model built without a surveyor",
         request.where, request.name));
   }
   if (!request.inclusions.empty()) {
@@ -374,6 +381,7 @@ void finish(Model& model, const Scene& scene, const ClosingSearch& close) {
   close_gradients(model, close ? close : search_on_host);
   find_following(model);
   add_contact(model, scene);
+  find_fracture(model, scene);
   add_warnings(model, model.surfels.position.size());
 }
 

@@ -67,6 +67,9 @@ std::uint64_t digest_of_phyxels(const Model& model) {
       sum += digest_of(std::array{static_cast<double>(model.global_id(i)), x.x, x.y, x.z,
                                   model.neighbourhood.support[i],
                                   part.kernel_volumes ? 0.0 : model.volume[i]});
+      if (model.fracture.growth.empty()) continue;
+      sum +=
+          digest_of(std::array{static_cast<double>(model.global_id(i)), model.fracture.growth[i]});
     }
   }
   std::int64_t entry = 0;

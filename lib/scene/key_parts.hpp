@@ -47,4 +47,7 @@ std::vector<SceneKey> obstacle_keys();
 /// The keys of the contact of bodies with each other.
 std::vector<SceneKey> contact_keys();
 
+/// The keys of bodies that break.
+std::vector<SceneKey> fracture_keys();
+
 }  // namespace phyxel

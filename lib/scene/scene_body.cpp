@@ -9,6 +9,7 @@
 #include "phyxel/law_table.hpp"
 #include "phyxel/shapes.hpp"
 #include "scene/scene_error.hpp"
+#include "scene/scene_fracture.hpp"
 #include "scene/scene_source.hpp"
 
 namespace phyxel {
@@ -212,6 +213,8 @@ BodyRequest read_body_request(const SceneTable& table) {
     body.motions.push_back(read_motion(motion));
   }
   naming(body, [&] { choose_placement(table, body); });
+  if (table.has("fracture")) body.fracture = read_fracture(table.table("fracture"));
+  for (const SceneTable& notch : table.tables("notch")) body.notches.push_back(read_notch(notch));
   for (const SceneTable& load : table.tables("load")) body.loads.push_back(read_load(load));
   for (const SceneTable& traction : table.tables("traction")) {
     body.tractions.push_back(read_traction(traction));
@@ -240,6 +243,7 @@ BodyRequest copy_at(const BodyRequest& body, Vec3d by, std::size_t number) {
   }
   for (LoadRequest& load : copy.loads) move(load.select, by);
   for (TractionRequest& traction : copy.tractions) move(traction.select, by);
+  move_fracture(copy, by);
   return copy;
 }
 

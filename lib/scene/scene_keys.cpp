@@ -266,6 +266,10 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Forces on phyxels."},
       {.section = "body", .name = "traction", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Forces and pressures on the surface."},
+      {.section = "body", .name = "fracture", .type = KeyType::table, .otherwise = "the body does not break",
+       .meaning = "How the body breaks."},
+      {.section = "body", .name = "notch", .type = KeyType::tables, .otherwise = "none",
+       .meaning = "Discs along which the body is cut before it moves."},
 
       {.section = "body.material", .name = "young", .unit = "Pa", .otherwise = "required by laws that have it",
        .range = between(1e-12, stiffest), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},
@@ -453,10 +457,10 @@ std::vector<SceneKey> place_keys() {
 std::span<const SceneKey> scene_keys() {
   static const std::vector<SceneKey> all = [] {
     std::vector<SceneKey> keys;
-    for (const auto& part :
-         {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
-          law_keys("body.inclusion"), grading_keys(), path_keys("body.motion"), boundary_keys(),
-          path_keys("obstacle.motion"), obstacle_keys(), contact_keys(), place_keys()}) {
+    for (const auto& part : {top_keys(), run_keys(), body_keys(), law_keys("body.material"),
+                             law_keys("body.inclusion"), grading_keys(), path_keys("body.motion"),
+                             boundary_keys(), fracture_keys(), path_keys("obstacle.motion"),
+                             obstacle_keys(), contact_keys(), place_keys()}) {
       keys.insert(keys.end(), part.begin(), part.end());
     }
     return keys;

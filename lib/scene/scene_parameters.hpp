@@ -186,6 +186,29 @@ void visit_body(const BodyRequest& body, Visit&& visit) {
   if (rule.max_neighbours) visit("body.neighbours", "max_neighbours", *rule.max_neighbours);
 }
 
+/// Visits how a body breaks, but for its regions.
+template <class Visit>
+void visit_fracture(const FractureRequest& fracture, Visit&& visit) {
+  visit("body.fracture", "energy_release_rate", fracture.energy_release_rate);
+  if (fracture.strength) visit("body.fracture", "strength", *fracture.strength);
+  if (!fracture.scatter) return;
+  visit("body.fracture", "scatter", *fracture.scatter);
+  visit("body.fracture", "seed", fracture.seed);
+}
+
+/// `visit(entry, notch, values)` for each notch of a body, as `visit_lists`.
+template <class Visit>
+void visit_notches(const BodyRequest& body, Visit&& visit) {
+  for (std::size_t k = 0; k < body.notches.size(); ++k) {
+    const NotchRequest& notch = body.notches[k];
+    visit(k + 1, notch, [&](auto&& inner) {
+      inner("body.notch", "centre", notch.centre);
+      inner("body.notch", "normal", notch.normal);
+      inner("body.notch", "radius", notch.radius);
+    });
+  }
+}
+
 /// `visit(entry, list, select, values)` for each entry of a body's lists, where `values(visit)`
 /// visits what the entry has beside its selection.
 template <class Visit>
@@ -204,6 +227,9 @@ void visit_lists(const BodyRequest& body, Visit&& visit) {
   each(body.fixed, "fixed", [](const FixRequest& fix, auto&& inner) {
     inner("body.fixed", "axes", axes_in_words(fix.axes));
   });
+  for (std::size_t k = 0; body.fracture && k < body.fracture->unbreakable.size(); ++k) {
+    visit(k + 1, "fracture.unbreakable", body.fracture->unbreakable[k], [](auto&&) {});
+  }
   each(body.motions, "motion",
        [](const MotionRequest& motion, auto&& inner) { visit_motion(motion, inner); });
   each(body.loads, "load", [](const LoadRequest& load, auto&& inner) {
@@ -319,6 +345,13 @@ void for_each_parameter(const Scene& scene, Visit&& visit) {
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyRequest& body = scene.bodies[b];
     detail::visit_body(body, of({&body, b + 1, "", 0, &body.where}));
+    if (body.fracture) {
+      detail::visit_fracture(*body.fracture,
+                             of({&body, b + 1, "fracture", 1, &body.fracture->where}));
+    }
+    detail::visit_notches(body, [&](std::size_t entry, const NotchRequest& notch, auto&& values) {
+      values(of({&body, b + 1, "notch", entry, &notch.where}));
+    });
     detail::visit_lists(
         body, [&](std::size_t entry, const char* list, const Selection& select, auto&& values) {
           const auto inner = of({&body, b + 1, list, entry, &select.where});

@@ -45,6 +45,16 @@ std::vector<SceneSection> boundary_sections() {
        "direction as the body deforms, unless `follower` is true. Phyxels get their shares such that total, centroid and torque are "
        "those on the triangles. The pressure [Pa] of a gas and the volume [m^3] of its cavity are "
        "written at each frame to `gas.csv`, with step, time, body and set, e.g. `traction 1`."},
+      {"body.fracture", "[body.fracture]", "",
+       "Brittle fracture: two neighbours of the body above break apart for good where their distance grows beyond a critical share, which follows "
+       "from `energy_release_rate`, the stiffness and the distance between phyxels. Needs an elastic law with `young` and `poisson` from 0 to "
+       "0.35, hourglass control of 0.05 to 0.2, symmetric lists, and `neighbours.factor` of 1.55 to 1.88; without viscosity and volume stiffness. "
+       "Where materials meet, the weaker phyxel of a pair decides. The energy that breaking takes is a column of `energy.csv`. Faces of cracks do not touch each other."},
+      {"body.fracture.unbreakable", "[[body.fracture.unbreakable]]", "selection",
+       "A `box` or a `ball` whose phyxels break from no other."},
+      {"body.notch", "[[body.notch]]", "",
+       "A disc along which the body above is cut before it moves: phyxels on different sides of the disc, whose connection crosses it, are no neighbours. "
+       "A phyxel in its plane counts as above it. Faces of notches do not touch each other."},
       {"obstacle", "[[obstacle]]", "",
        "A rigid body that others cannot enter: a floor, a wall, a bin, a punch, or, with a `density`, a free body. `shape` needs its lengths: `size` of a box, "
        "`radius` of a sphere, `radius` and `length` of a cylinder or capsule. It is turned, then moved into place, and rests "

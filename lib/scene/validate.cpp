@@ -8,6 +8,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/law_table.hpp"
 #include "scene/scene_contact.hpp"
+#include "scene/scene_fracture.hpp"
 #include "scene/scene_obstacles.hpp"
 #include "scene/scene_parameters.hpp"
 #include "scene/scene_schema.hpp"
@@ -121,6 +122,7 @@ void validate(const Scene& scene) {
   for (const ObstacleRequest& obstacle : scene.obstacles) check_obstacle(obstacle);
   if (scene.contact) check_contact(*scene.contact, scene.bodies);
   check_penalties(scene);
+  check_fracture_request(scene);
   for (const BodyRequest& body : scene.bodies) {
     check_law(body, body.material, body.where);
     for (const InclusionRequest& inclusion : body.inclusions) {

@@ -19,10 +19,11 @@
 namespace phyxel {
 
 /// Record of a phyxel that the first pass reads: its length, and the offset of each value.
-/// `support` is 1/h² [1/m²], or `relative_half_support` in bodies with weights of pairs.
+/// `support` is 1/h² [1/m²], or `relative_half_support` in bodies with weights of pairs; `growth`
+/// is that of `Fracture`, or 0 if no pair may break.
 struct PointRecord {
   static constexpr int size = 8;
-  enum { position = 0, support = 3, displacement = 4 };
+  enum { position = 0, support = 3, displacement = 4, growth = 7 };
 };
 /// Record of a phyxel that the second pass reads, likewise.
 struct StressRecord {
@@ -238,16 +239,19 @@ class CpuArrays {
         pair_scale_.resize(static_cast<std::size_t>(layout_.packs()), Real(0));
         pair_scale_[slot / W] = static_cast<Real>(1 / (part.pair_length * part.pair_length));
       }
-      const Sym3d& a = model_.inverse_moment[i];
-      const double entries[] = {a.xx, a.xy, a.xz, a.yy, a.yz, a.zz};
-      for (int e = 0; e < 6; ++e) {
-        component(inverse_moment_, slot, e, 6) = static_cast<Real>(entries[e]);
-      }
-      set3(moment_offset_, slot, model_.moment_offset[i]);
+      set_moment(slot, model_.inverse_moment[i], model_.moment_offset[i]);
       if (!closing_.empty()) set3(closing_, slot, model_.closing[i]);
       volume_[slot] = static_cast<Real>(model_.volume[i]);
       inverse_mass_[slot] = static_cast<Real>(1 / model_.mass[i]);
     }
+  }
+  void set_moment(Index slot, const Sym3d& inverse, Vec3d offset) {
+    const double entries[] = {inverse.xx, inverse.xy, inverse.xz,
+                              inverse.yy, inverse.yz, inverse.zz};
+    for (int e = 0; e < 6; ++e) {
+      component(inverse_moment_, slot, e, 6) = static_cast<Real>(entries[e]);
+    }
+    set3(moment_offset_, slot, offset);
   }
   static void set_values(Real* at, Vec3d v) {
     at[0] = static_cast<Real>(v.x);

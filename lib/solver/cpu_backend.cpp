@@ -9,7 +9,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/error.hpp"
 #include "solver/body_contacts.hpp"
-#include "solver/cpu_passes.hpp"
+#include "solver/cpu_fracture.hpp"
 #include "solver/cpu_surfels.hpp"
 #include "solver/following_loads.hpp"
 #include "solver/step_contacts.hpp"
@@ -19,8 +19,8 @@ namespace phyxel {
 namespace {
 
 template <class Real, class StateReal>
-class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
-  using Passes = CpuPasses<Real, StateReal>;
+class CpuBackend final : public Backend, private CpuFracture<Real, StateReal> {
+  using Passes = CpuFracture<Real, StateReal>;
   using Passes::W;
   using typename Passes::P;
   using typename Passes::Run;
@@ -50,12 +50,16 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   Index size() const override { return model_.size(); }
 
   void put(const State& state) override {
+    this->put_broken(state);
     this->put_state(state);
+    this->remember_displacements();
     contacts_.put_rigid(state.rigid, state.dt);
   }
   void download(State& state) const override {
     this->get_state(state);
     state.rigid = contacts_.rigid_states();
+    state.broken = this->broken_pairs().pairs();
+    state.worn = this->broken_pairs().worn();
   }
 
   std::optional<StateView> view() const override {
@@ -85,6 +89,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
       find_stresses(HistoryUse::commit);
       advance(static_cast<double>(first + s) * dt, dt);
       history_interval_ = dt;
+      this->break_pairs(true);
       if (move_surfels) update_surfels();
     }
   }
@@ -94,6 +99,10 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     const StepSums of_obstacles = contacts_.sums();
     sums.insert(sums.end(), of_obstacles.begin(), of_obstacles.end());
     sums.insert(sums.end(), body_contacts_.sums().begin(), body_contacts_.sums().end());
+    if (this->may_break()) {
+      sums.resize(sums_before_fracture(model_));
+      sums.push_back(this->fracture_energy());
+    }
     return words_of(std::move(sums));
   }
 
@@ -107,6 +116,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
   }
   void set_history_interval(double interval) override { history_interval_ = interval; }
   void commit_history() override {
+    this->break_pairs(false);
     if (this->history_columns_.empty()) return;  // the same on all ranks
     find_stresses(HistoryUse::commit);
     history_interval_ = 0;
@@ -152,6 +162,20 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     }
     residual.resize(static_cast<std::size_t>(model_.size()));
     for (Index i = 0; i < model_.size(); ++i) residual[i] = by_slot[layout_.slot(i)];
+  }
+
+  std::optional<Breakage> breakage() const override {
+    if (!model_.fracture.acts()) return std::nullopt;
+    Breakage now;
+    now.broken.resize(static_cast<std::size_t>(model_.size()), 0);
+    now.carried.resize(static_cast<std::size_t>(model_.size()), 1);
+    now.closed.resize(static_cast<std::size_t>(model_.size()), 0);
+    for (const Index i : this->broken_pairs().phyxels()) {
+      now.broken[i] = this->broken_pairs().share(i);
+      now.carried[i] = this->broken_pairs().of_point(i).carried;
+      now.closed[i] = this->closed_energy(i);
+    }
+    return now;
   }
 
   void update_surfels() override { advect_surfels(moved_surfels_); }
@@ -201,6 +225,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     if (const std::size_t bytes = contacts_.bytes() + body_contacts_.bytes(); bytes > 0) {
       list.push_back({"contact", bytes});
     }
+    if (model_.fracture.acts()) list.push_back({"fracture", this->fracture_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     return list;
   }
@@ -229,6 +254,7 @@ class CpuBackend final : public Backend, private CpuPasses<Real, StateReal> {
     const Phase phase("stresses");
     this->pass(this->stress_records(),
                [&](const std::vector<Run>& runs) { Passes::find_stresses(runs, use); });
+    this->push_closed();
   }
   /// Runs pass 2 for all phyxels, from `time` [s] to `time` + `dt`.
   void advance(double time, double dt) {

@@ -67,6 +67,7 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
   };
   const std::vector<Vec3d> free = free_axes(model);
   const std::vector<std::string> columns = history_columns(model);
+  const std::optional<Breakage> breakage = backend.breakage();
 
   std::vector<PartLaw> laws;
   std::vector<PartHistory> histories;
@@ -97,22 +98,23 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
         const PointResponse<double> response = error.caught([&] {
           return law.after_step(gradient[i], history.of(i, numbers), state.history_interval);
         });
-        own.add(totals_of({.mass = model.mass[i],
-                           .volume = model.volume[i],
-                           .position = model.position[i] + u,
-                           .displacement = u,
-                           .velocity = state.velocity[i],
-                           .flow = half,
-                           .free = free.empty() ? Vec3d{1, 1, 1} : free[i],
-                           .internal = force[i],
-                           .load = value_of(loads, i),
-                           .following = value_of(following, i),
-                           .external = value_of(external, i),
-                           .gravity = model.gravity,
-                           .grad_u = gradient[i],
-                           .hourglass = kappa,
-                           .residual = kappa > 0 ? residual[i] : 0},
-                          response),
+        own.add(totals_of(
+                    {.mass = model.mass[i],
+                     .volume = breakage ? breakage->carried[i] * model.volume[i] : model.volume[i],
+                     .position = model.position[i] + u,
+                     .displacement = u,
+                     .velocity = state.velocity[i],
+                     .flow = half,
+                     .free = free.empty() ? Vec3d{1, 1, 1} : free[i],
+                     .internal = force[i],
+                     .load = value_of(loads, i),
+                     .following = value_of(following, i),
+                     .external = value_of(external, i),
+                     .gravity = model.gravity,
+                     .grad_u = gradient[i],
+                     .hourglass = kappa,
+                     .residual = kappa > 0 ? residual[i] : 0},
+                    response),
                 model.global_id(i));
       }
     }
@@ -121,6 +123,18 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
   }
   error.rethrow();
   return all;
+}
+
+/// The energy of closed cracks [J]. Of a share: collective.
+double energy_of_closed_cracks(const Model& model, const Backend& backend) {
+  const std::optional<Breakage> breakage = backend.breakage();
+  if (!breakage) return 0;  // the same on all ranks
+  std::vector<ExactSum> sum(1);
+  for (const Part& part : model.parts) {
+    for (Index i = part.begin; i < part.owned_end(); ++i) sum[0].add(breakage->closed[i]);
+  }
+  add_over_ranks(model, sum);
+  return sum[0].value();
 }
 
 }  // namespace
@@ -134,6 +148,7 @@ Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
     d = all.values();
   }
   d->load_energy += energy_of_following(model, backend, now.time);
+  d->contact_energy += energy_of_closed_cracks(model, backend);
   add_rigid(model, backend.rigid_states(), now.lag, *d);
   d->step = now.step;
   d->time = now.time;
@@ -176,7 +191,7 @@ void add_penalties(const Model& model, Backend& backend, const Solver& solver, D
     }
   }
   add_over_ranks(model, sums);
-  d.contact_energy = sums[0].value();
+  d.contact_energy += sums[0].value();
   d.kinetic_energy += sums[1].value();
   d.contact_loss -= sums[2].value() + sums[3].value();
   d.momentum += Vec3d{sums[4].value(), sums[5].value(), sums[6].value()};
@@ -203,9 +218,11 @@ std::vector<double> speeds_of_bodies(const Model& model, Backend& backend) {
 
 Diagnostics diagnose(const Model& model, Backend& backend, const Solver& solver) {
   Diagnostics d = diagnose(model, backend, solver.now());
-  if (touching_count(model) == 0) return d;
+  if (touching_count(model) == 0 && !model.fracture.breaks) return d;
   StepSums all = no_step_sums(model);
   add_words(all, solver.step_sums());
+  if (model.fracture.breaks) d.fracture_energy = all.back().value();
+  if (touching_count(model) == 0) return d;
   ExactSum loss;
   for (std::size_t o = 0; o < touching_count(model); ++o) {
     const std::size_t first = sums_of_motions(model) + o * ContactTerms::count;

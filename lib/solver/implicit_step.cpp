@@ -182,6 +182,8 @@ void ImplicitStep::take_both_stages(State& state) {
   backend_.download(history);
   state.history = std::move(history.history);
   state.history_interval = history.history_interval;
+  state.broken = std::move(history.broken);
+  state.worn = std::move(history.worn);
   ++state.step;
   state.time = end;
   if (model_.motions.empty()) return;

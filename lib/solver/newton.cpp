@@ -309,12 +309,13 @@ void Newton::put(const Vector& u) {
   backend_.put_displacements(placed_);
 }
 
-/// The potential energy [J] at u without that of contact. Call right after
+/// The potential energy [J] at u without that of contact, but for closed cracks. Call right after
 /// `forces_without_contact` at the same u.
 double Newton::potential(const Balance& balance, const Vector& u) {
   // Includes the incremental potentials of plastic and viscous stresses over one step.
   const Diagnostics now = diagnose(model_, backend_, 0, 1);
-  const double elastic = now.elastic_energy() + now.plastic_work + 0.5 * now.viscous_work;
+  const double elastic =
+      now.elastic_energy() + now.contact_energy + now.plastic_work + 0.5 * now.viscous_work;
   ++evaluations_;
   double inert = 0;
   if (!balance.weight.empty()) {

@@ -27,6 +27,17 @@ std::vector<double> boundary_of(const Model& model) {
   return marks;
 }
 
+std::vector<double> broken_of(const Model& model, const Backend& backend) {
+  const std::optional<Breakage> breakage = backend.breakage();
+  return breakage ? breakage->broken
+                  : std::vector<double>(static_cast<std::size_t>(model.size()), 0);
+}
+
+/// True for a field that follows from displacement gradients.
+bool follows_from_gradient(Quantity quantity) {
+  return quantity != Quantity::boundary && quantity != Quantity::broken;
+}
+
 /// The arrays that a computation fills, by quantity.
 class Arrays {
  public:
@@ -81,7 +92,9 @@ std::span<const PointField> point_fields() {
        "principal values of the Cauchy stress [Pa], the largest first"},
       {"strain", Quantity::strain, "Green's strain: xx, yy, zz, xy, yz, xz"},
       {"boundary", Quantity::boundary,
-       "sum of 1 for phyxels that are held along an axis, 2 for moved and 4 for loaded ones"}};
+       "sum of 1 for phyxels that are held along an axis, 2 for moved and 4 for loaded ones"},
+      {"broken", Quantity::broken,
+       "share of a phyxel's pairs that are broken, by cracks and notches"}};
   return fields;
 }
 
@@ -95,8 +108,7 @@ std::vector<Quantity> wanted_fields(const OutputRequest& output) {
 
 std::unique_ptr<const Recovery> recovery_for(const OutputRequest& output, const Model& model) {
   const std::vector<Quantity> wanted = wanted_fields(output);
-  const bool follows =
-      std::any_of(wanted.begin(), wanted.end(), [](Quantity q) { return q != Quantity::boundary; });
+  const bool follows = std::any_of(wanted.begin(), wanted.end(), follows_from_gradient);
   return output.recovery && (follows || !model.probes.empty()) ? std::make_unique<Recovery>(model)
                                                                : nullptr;
 }
@@ -106,6 +118,9 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
   FieldValues values;
   std::vector<Quantity> computed(wanted.begin(), wanted.end());
   if (std::erase(computed, Quantity::boundary) > 0) values[Quantity::boundary] = boundary_of(model);
+  if (std::erase(computed, Quantity::broken) > 0) {
+    values[Quantity::broken] = broken_of(model, backend);
+  }
   if (computed.empty()) return values;
   check_fits(model, backend);
   std::vector<Mat3d> own;
@@ -114,6 +129,8 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
   const std::vector<std::string> columns = history_columns(model);
   State state;
   if (recovery || (has_stresses && !columns.empty())) backend.download(state);
+  // A recovered gradient would reach across cracks.
+  const std::optional<Breakage> breakage = backend.breakage();
   std::vector<Mat3d> recovered;
   if (recovery) recovered = recovery->gradients(state.displacement);
   Arrays arrays(values, computed, static_cast<Index>(own.size()));
@@ -125,7 +142,8 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
     for (Index i = part.begin; i < part.owned_end(); ++i) {
       thread_local std::vector<double> numbers;
       numbers.resize(history.size());
-      const bool is_recovered = recovery && recovery->share(i) > 0;
+      const bool is_whole = !breakage || breakage->broken[i] == 0;
+      const bool is_recovered = recovery && recovery->share(i) > 0 && is_whole;
       if (!is_recovered && !has_stresses) {
         set_strains(arrays, i, own[i]);
         continue;
@@ -139,7 +157,8 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
       });
       set_strains(arrays, i, point.grad_u);
       if (!has_stresses) continue;
-      set_stresses(arrays, i, cauchy_stress(point.first_piola_stress, point.grad_u));
+      const double carried = breakage ? breakage->carried[i] : 1;
+      set_stresses(arrays, i, carried * cauchy_stress(point.first_piola_stress, point.grad_u));
     }
     error.rethrow();
   }

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/fracture.hpp"
 #include "model/owned_vectors.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
+#include "rank_exchange.hpp"
 #include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
 #include "solver/host_threads.hpp"
@@ -32,6 +34,7 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
+  state.broken = notched_pairs(model, scene);
   // Prescribed phyxels have not moved yet.
   if (scene.solver.method == Method::equilibrium) return state;
   std::vector<Vec3d> loaded(model.loads.empty() ? 0 : state.displacement.size());  // [N]
@@ -97,6 +100,27 @@ void refuse_impacts(const Model& model, Method method) {
   }
 }
 
+/// The values of all ranks, ascending.
+template <class T>
+std::vector<T> joined_over_ranks(const Communicator& ranks, const std::vector<T>& here) {
+  std::vector<T> all;
+  for (const std::vector<T>& of_rank : allgathered(ranks, here)) {
+    all.insert(all.end(), of_rank.begin(), of_rank.end());
+  }
+  std::sort(all.begin(), all.end());
+  return all;
+}
+
+/// Refuses pairs that break to the search for equilibrium, in which none would.
+void refuse_fracture(const Model& model) {
+  if (!model.fracture.breaks) return;
+  const char* why =
+      "body.fracture found with solver.method = \"equilibrium\"; allowed with this method: bodies "
+      "that do not break, which may have notches, or \"verlet\" and \"implicit\"";
+  if (model.share) throw AgreedError(ExitCode::bad_input, why);
+  throw InputError(why);
+}
+
 }  // namespace
 
 Solver::Solver(Backend& backend, const State& start)
@@ -116,6 +140,7 @@ Solver::Solver(const Model& model, Backend& backend, const State& start, Method 
   check_fits(model, backend);
   if (method != Method::verlet) check_precision(backend, method);
   if (method != Method::verlet) refuse_impacts(model, method);
+  if (method == Method::equilibrium) refuse_fracture(model);
   const std::size_t words = words_of(no_step_sums(model)).size();
   if (!start.step_sums.empty() && start.step_sums.size() != words) {
     throw InputError(
@@ -202,6 +227,13 @@ State Solver::state() const {
   state.time = time();
   state.looks = looks_;
   state.step_sums = step_sums();
+  if (model_ && model_->share && model_->fracture.acts()) {
+    const Communicator& ranks = *model_->share->communicator;
+    state.broken = joined_over_ranks(ranks, state.broken);
+    // A pair of two ranks is in the lists of both.
+    state.broken.erase(std::unique(state.broken.begin(), state.broken.end()), state.broken.end());
+    state.worn = joined_over_ranks(ranks, state.worn);
+  }
   return state;
 }
 

@@ -8,6 +8,7 @@
 #include "model/owned_vectors.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/fracture.hpp"
 #include "phyxel/solver.hpp"
 #include "solver/contact_stiffness.hpp"
 #include "solver/host_threads.hpp"
@@ -188,6 +189,12 @@ double with_contact(const Model& model, double omega) {
   return of_contact > 0 && omega > 0 ? std::hypot(omega, of_contact) : omega;
 }
 
+/// The largest stable step of a model whose largest frequency is `omega` [rad/s] while it is whole.
+double largest_step(const Model& model, double omega) {
+  const double share = model.fracture.acts() ? breaking_step_share : 1;
+  return share * stable_step(omega, largest_viscosity(model));
+}
+
 StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
   StepLimit limit;
   limit.sound_step = smallest_sound_step(model);
@@ -202,7 +209,7 @@ StepLimit step_limit(const Model& model, Vibration& vibration, Stage& stage) {
     if (model.share) throw AgreedError(ExitCode::bad_input, why);
     throw InputError(why);
   }
-  limit.largest_step = stable_step(limit.omega_max, largest_viscosity(model));
+  limit.largest_step = largest_step(model, limit.omega_max);
   stage.finish();
   return limit;
 }
@@ -258,7 +265,7 @@ StepLimit present_step_limit(const Model& model, Backend& backend) {
   }
   StepLimit limit;
   limit.omega_max = with_contact(model, found.omega);
-  limit.largest_step = stable_step(limit.omega_max, largest_viscosity(model));
+  limit.largest_step = largest_step(model, limit.omega_max);
   limit.iterations = found.iterations;
   return limit;
 }

@@ -21,7 +21,8 @@ inline bool has_moving_supports(const Model& model) {
 }
 
 /// Exact sums of the work of each motion [J], none if no support moves; then those of each
-/// obstacle, and those of each body of the scene if bodies touch each other (`ContactTerms`).
+/// obstacle, and those of each body of the scene if bodies touch each other (`ContactTerms`); last
+/// the energy that broken pairs have taken [J], if pairs may break.
 using StepSums = std::vector<ExactSum>;
 
 /// Returns the number of sums of motions, after which those of obstacles begin.
@@ -34,9 +35,14 @@ inline std::size_t touching_count(const Model& model) {
   return model.obstacles.size() + model.body_contact.distances.size();
 }
 
+/// Returns the number of sums before that of fracture.
+inline std::size_t sums_before_fracture(const Model& model) {
+  return sums_of_motions(model) + ContactTerms::count * touching_count(model);
+}
+
 /// Returns sums of zero.
 inline StepSums no_step_sums(const Model& model) {
-  return StepSums(sums_of_motions(model) + ContactTerms::count * touching_count(model));
+  return StepSums(sums_before_fracture(model) + (model.fracture.breaks ? 1 : 0));
 }
 
 /// Returns the words of exact sums, as backends and checkpoints hold them.

@@ -135,6 +135,8 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   Header now{};
   std::vector<std::int64_t> step_sums;
   std::vector<RigidState> rigid;
+  std::vector<PhyxelPair> broken;
+  std::vector<WornPhyxel> worn;
   ranks_.collectively([&] {
     if (length < 1)
       throw InputError(fmt::format("{} phyxels at a time; allowed: 1 or more", length));
@@ -146,6 +148,8 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
     now = {header.step, header.time, header.dt, header.history_interval, header.looks};
     step_sums = header.step_sums;
     rigid = header.rigid;
+    broken = header.broken;
+    worn = header.worn;
   });
   if (!here_.share) return checkpoint->state(0, here_.size());
   State state = exchange_->scattered(
@@ -158,6 +162,8 @@ State SharedModel::state_of(const CheckpointReader* checkpoint, Index length) co
   state.looks = now.looks;
   state.step_sums = ranks_.communicator().broadcast(step_sums);
   state.rigid = ranks_.communicator().broadcast(rigid);
+  state.broken = ranks_.communicator().broadcast(broken);
+  state.worn = ranks_.communicator().broadcast(worn);
   return state;
 }
 

@@ -299,6 +299,24 @@ density = 1000
 [[body.inclusion]]
 region = 'x-'
 relaxation = [[0.1, 0.2], [1, 0.3]] # body.inclusion.relaxation => relaxation = [[0.1, 0.2], [1, 0.4]]
+[[body]]
+name = 'twelfth'
+cloud = 'd'
+[body.material]
+young = 1e5
+poisson = 0.3
+density = 1000
+[body.fracture]
+energy_release_rate = 5 # body.fracture.energy_release_rate => energy_release_rate = 6
+strength = 1e6 # body.fracture.strength => strength = 2e6
+scatter = 10 # body.fracture.scatter => scatter = 11
+seed = 3 # body.fracture.seed => seed = 4
+[[body.fracture.unbreakable]]
+box = [[0, 0, 0], [1, 1, 1]]
+[[body.notch]]
+centre = [0, 0, 1] # body.notch.centre => centre = [0, 0, 2]
+normal = [0, 0, 1] # body.notch.normal => normal = [0, 1, 1]
+radius = 2 # body.notch.radius => radius = 3
 [[probe]]
 name = 'tip' # probe.name => name = 'top'
 body = 'third' # probe.body => body = 'fourth'

@@ -65,6 +65,7 @@ std::vector<AccuracyCase> impact_cases();       ///< Bars of metal that strike a
 std::vector<AccuracyCase> contact_impacts();    ///< Bodies that hit each other.
 std::vector<AccuracyCase> contact_cylinders();  ///< Cylinders and straps in contact.
 std::vector<AccuracyCase> contact_cases();      ///< Bodies in contact: the group "contact".
+std::vector<AccuracyCase> fracture_cases();     ///< Bodies with cracks: the group "fracture".
 std::vector<AccuracyCase> accuracy_cases();     ///< All of them.
 
 }  // namespace phyxel::app

@@ -136,9 +136,14 @@ std::string listed_cases() {
   for (const AccuracyCase& c : cases) {
     if (c.group.empty()) text += fmt::format("\n{}: {}", c.name, c.what);
   }
-  text += "\nProblems of contact, all of which \"contact\" names:";
-  for (const AccuracyCase& c : cases) {
-    if (!c.group.empty()) text += fmt::format("\n{}: {}", c.name, c.what);
+  std::set<std::string> groups;
+  for (const AccuracyCase& c : cases) groups.insert(c.group);
+  groups.erase("");
+  for (const std::string& group : groups) {
+    text += fmt::format("\nProblems of {0}, all of which \"{0}\" names:", group);
+    for (const AccuracyCase& c : cases) {
+      if (c.group == group) text += fmt::format("\n{}: {}", c.name, c.what);
+    }
   }
   return text;
 }

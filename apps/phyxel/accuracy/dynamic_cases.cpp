@@ -413,7 +413,7 @@ std::vector<AccuracyCase> dynamic_cases() {
 std::vector<AccuracyCase> accuracy_cases() {
   std::vector<AccuracyCase> all;
   for (const auto& cases : {static_cases(), dynamic_cases(), plastic_cases(), collapse_cases(),
-                            impact_cases(), contact_cases()}) {
+                            impact_cases(), contact_cases(), fracture_cases()}) {
     all.insert(all.end(), cases.begin(), cases.end());
   }
   return all;

@@ -26,6 +26,13 @@ struct Exchanges {
   Traffic traffic;        ///< Of this rank, since the start.
 };
 
+/// What broken pairs have left of each phyxel. Values of ghosts are not valid.
+struct Breakage {
+  std::vector<double> broken;   ///< Broken share of a phyxel's pairs, shape [n].
+  std::vector<double> carried;  ///< Share of its volume that carries stress, likewise.
+  std::vector<double> closed;   ///< Energy of its closed cracks [J], likewise.
+};
+
 /// The contact of one rank in a step that is tried and taken back.
 struct NextContacts {
   /// Words of exact sums, as of `Backend::step_sums` without those of motions.
@@ -104,7 +111,7 @@ class Backend {
   /// Copies a state in without checking displacements and velocities: for states that the library's
   /// own methods have computed. The history is checked as in `upload`.
   virtual void put(const State& state) = 0;
-  /// Copies the present displacements, velocities and history out, in that order.
+  /// Copies the present displacements, velocities, history and broken pairs out.
   virtual void download(State& state) const = 0;
   /// The state where it is; nothing where that is no memory of the CPU.
   virtual std::optional<StateView> view() const { return std::nullopt; }
@@ -157,8 +164,8 @@ class Backend {
   /// Sets the time from the history to the present displacements [s], over which evaluations take
   /// rates, for methods that find displacements by themselves.
   virtual void set_history_interval([[maybe_unused]] double interval) {}
-  /// Ends a step of such a method: the history becomes that of the present displacements, and the
-  /// interval 0.
+  /// Ends a step of such a method: the history becomes that of the present displacements, the
+  /// interval 0, and pairs break that are stretched too far.
   virtual void commit_history() {}
   /// Internal forces [N] at the present displacements, shape [n, 3] (runs both passes).
   /// @param use `trial`: as the next step will find them; `frozen`: the derivative of the energy
@@ -181,6 +188,9 @@ class Backend {
   /// Passive surfel advection, equation (6): brings the surfels to the present displacements. They
   /// stay on the device, and may be under way when it returns.
   virtual void update_surfels() = 0;
+  /// What broken pairs have left of each phyxel; nothing if the model's pairs cannot break and were
+  /// not cut.
+  virtual std::optional<Breakage> breakage() const { return std::nullopt; }
   /// Brings them to the host, too.
   virtual void advect_surfels(SurfelState& surfels) = 0;
 

@@ -24,6 +24,7 @@ enum class Quantity {
   principal_stress,
   strain,
   boundary,
+  broken,           ///< Broken share of the pairs.
   surfel_position,  ///< Deformed.
   surfel_normal,
   history  ///< The first column of a state's history; further ones follow (`history_quantity`).
@@ -65,6 +66,7 @@ constexpr std::size_t width_of(Quantity quantity) {
     case Quantity::von_mises:
     case Quantity::volume_ratio:
     case Quantity::boundary:
+    case Quantity::broken:
       return 1;
     case Quantity::stress:
     case Quantity::strain:

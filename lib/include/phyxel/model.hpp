@@ -277,6 +277,18 @@ struct Surfels {
   std::span<const Triangle> triangles_of(const Part& first_part) const;
 };
 
+/// Which pairs of phyxels of a model may break.
+struct Fracture {
+  bool breaks = false;   ///< True if pairs of a body of the scene may break.
+  bool notched = false;  ///< True if a body of the scene has notches.
+  /// The critical growth of the pairs of each phyxel (physics/fracture.hpp), of ghosts, too, shape
+  /// [n]; negative if they never break. Empty unless `breaks`.
+  std::vector<double> growth;
+
+  /// True if pairs break, or are broken from the start.
+  bool acts() const { return notched || breaks; }
+};
+
 /// All bodies of a scene, concatenated, with neighbours, masses and inverse moments. Bodies never
 /// neighbour each other; parts of a body do. Immutable after `build_model`; host memory, double
 /// precision. Neighbour lists and moments are empty where a `Surveyor` left them to its device.
@@ -301,6 +313,7 @@ struct Model {
   BodyContact body_contact;
   std::vector<Following> following;  ///< Of loads that follow the surface, in their order.
   std::vector<Probe> probes;
+  Fracture fracture;
   std::vector<Walls> walls;  ///< Of each body.
   Vec3d gravity;             ///< [m/s^2]
   Degenerate degenerate;

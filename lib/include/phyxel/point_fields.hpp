@@ -33,10 +33,10 @@ std::vector<Quantity> wanted_fields(const OutputRequest& output);
 /// xy, yz, xz. Values of ghosts are 0.
 /// @param recovery of the model's gradients: on the surface, fields are then those of the recovered
 ///   gradient, changed along the normal so that the traction is that of the phyxel's own stress.
-///   Viscous stresses stay. Phyxels that have yielded, or have the history of a caller's law, keep
-///   their own gradient, and so does one whose det F that would change by a factor of two, as at a
-///   kink. Null: fields are of the gradients from which forces follow. Collective on a share, if
-///   not null
+///   Viscous stresses stay. Phyxels that have broken pairs, or have yielded, or have the history of
+///   a caller's law, keep their own gradient, and so does one whose det F that would change by a
+///   factor of two, as at a kink. Null: fields are of the gradients from which forces follow.
+///   Collective on a share, if not null
 FieldValues find_fields(const Model& model, Backend& backend, std::span<const Quantity> wanted,
                         const Recovery* recovery = nullptr);
 

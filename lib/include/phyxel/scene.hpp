@@ -178,6 +178,28 @@ struct FinerRequest {
 /// a tenth of a per mille of those of gradients closed entirely; stresses within some percent.
 inline constexpr double automatic_closure = 0.01;
 
+/// Brittle fracture of a body: pairs of phyxels break that are stretched too far.
+struct FractureRequest {
+  /// Energy that a crack takes by its area, G_c [J/m²].
+  double energy_release_rate = 0;
+  /// Stress across a body without cracks at which pairs break [Pa]; unset: that which follows from
+  /// `energy_release_rate` and the distance between phyxels.
+  std::optional<double> strength;
+  /// Modulus of a Weibull distribution of critical stretches; unset: all are the same.
+  std::optional<double> scatter;
+  std::uint64_t seed = 1;              ///< Of the scatter.
+  std::vector<Selection> unbreakable;  ///< Boxes and balls whose phyxels break from no other.
+  std::string where = {};              ///< "scene.toml:30:1", for errors.
+};
+
+/// A disc along which a body is cut before it moves, once the body is in place.
+struct NotchRequest {
+  Vec3d centre;            ///< [m]
+  Vec3d normal;            ///< Not zero.
+  double radius = 0;       ///< [m]
+  std::string where = {};  ///< "scene.toml:30:1", for errors.
+};
+
 /// One body of a scene.
 struct BodyRequest {
   std::string name;
@@ -205,6 +227,8 @@ struct BodyRequest {
   std::vector<LoadRequest> loads;
   std::vector<TractionRequest> tractions;
   std::vector<ProbeRequest> probes;
+  std::optional<FractureRequest> fracture;  ///< Unset: no pair breaks.
+  std::vector<NotchRequest> notches;
   std::string where;  ///< "scene.toml:7:1", for errors.
 };
 

@@ -1,6 +1,8 @@
 /// The variables of a simulation that change from step to step, which checkpoints hold.
 #pragma once
 
+#include <array>
+#include <compare>
 #include <string>
 #include <vector>
 
@@ -49,6 +51,16 @@ struct HistoryColumn {
   bool operator==(const HistoryColumn&) const = default;
 };
 
+/// Global ids of two phyxels.
+using PhyxelPair = std::array<Index, 2>;
+
+/// A phyxel that has broken pairs and carries stress with a part of its volume.
+struct WornPhyxel {
+  Index phyxel = 0;    ///< Global id.
+  double carried = 1;  ///< That share of its volume.
+  auto operator<=>(const WornPhyxel&) const = default;
+};
+
 /// The state of all phyxels. A `float` run's values are exactly representable as float.
 struct State {
   std::vector<Vec3d> displacement;  ///< u(t) [m], shape [n, 3]; never the absolute position.
@@ -69,6 +81,12 @@ struct State {
   std::vector<std::int64_t> step_sums;
   /// The states of the free rigid bodies, in the order of the model's obstacles. Empty: they start.
   std::vector<RigidState> rigid;
+  /// The broken pairs of phyxels, by global ids, ascending, the smaller id first. Of a share: those
+  /// of which this rank steps a phyxel, and perhaps others (`Solver::state`: all).
+  std::vector<PhyxelPair> broken;
+  /// The phyxels of broken pairs that carry stress with less than their volume, by ascending ids,
+  /// likewise.
+  std::vector<WornPhyxel> worn;
 };
 
 /// Time level of a backend's state. Velocities are stored at `time - lag` (lag is dt/2 for
@@ -119,6 +137,7 @@ struct Diagnostics {
   double viscous_work = 0;      ///< [J], turned into heat by viscosity since the start.
   double contact_loss = 0;      ///< [J], lost in impacts and by friction on obstacles since t = 0.
   double contact_energy = 0;    ///< [J], stored in the springs of contact by penalties.
+  double fracture_energy = 0;   ///< [J], taken from the elastic energy where pairs broke.
   double gravity_energy = 0;    ///< [J], zero at rest.
   double load_energy = 0;       ///< [J], potential of the point and body loads.
   /// Energy of the deformation [J].
@@ -129,7 +148,7 @@ struct Diagnostics {
   /// damping, motions and changing loads (`is_conservative`).
   double total_energy() const {
     return kinetic_and_elastic_energy() + plastic_work + viscous_work + contact_loss +
-           contact_energy + gravity_energy + load_energy;
+           contact_energy + fracture_energy + gravity_energy + load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.

@@ -50,7 +50,7 @@ class Parameters : public SceneFiles {
 TEST_F(Parameters, EveryKeyIsComparedByNameOrFreeForAReason) {
   // Keys that become something else.
   const std::map<std::string, std::string> known_as = {
-      {"body.array.count", "bodies: 13 then, 14 now"},
+      {"body.array.count", "bodies: 14 then, 15 now"},
       {"body.array.spacing",
        "body.translation of body 3 (\"second 2\"): [5, 0, 0] then, "
        "[6, 0, 0] now"},
