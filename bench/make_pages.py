@@ -24,7 +24,9 @@ bench/compare/*.py, and
     build/cpu/bin/phyxel_studies laws --csv docs/results/laws.csv --force
     build/cpu/bin/phyxel_studies neighbour-search --csv docs/results/cpu_neighbours.csv --force
     build/cpu/bin/phyxel accuracy hard --long --csv docs/results/hard_cases_cpu.csv --force
-    taskset -c 0 build/cpu/bin/phyxel accuracy contact --csv docs/results/accuracy_contact.csv --force
+    for group in contact fracture; do
+      taskset -c 0 build/cpu/bin/phyxel accuracy $group --csv docs/results/accuracy_$group.csv --force
+    done
 """
 import argparse
 import difflib

@@ -24,9 +24,11 @@ says."""
 #: The discretisations in the summary.
 SUMMARY = ["cells, plain", "nodes, plain", "nodes, α = 0.1", "nodes, jitter 0.2, plain",
            "nodes, jitter 0.2, α = 0.1, closed", "mesh, plain", "mesh, α = 0.1", "mesh, α = 0.1, closed"]
-#: The discretisations in the summary of contact.
-SUMMARY_OF_CONTACT = ["nodes, α = 0.1", "nodes, α = 0.1, closed", "nodes, jitter 0.2, α = 0.1, closed", "cells, α = 0.1",
-                      "mesh, α = 0.1", "mesh, α = 0.1, closed"]
+#: The discretisations in the summaries of groups of cases, which have tables of their own.
+SUMMARY_OF_GROUPS = ["nodes, α = 0.1", "nodes, α = 0.1, closed", "nodes, jitter 0.2, α = 0.1",
+                     "nodes, jitter 0.2, α = 0.1, closed", "cells, α = 0.1", "cells, jitter 0.2, α = 0.1",
+                     "mesh, α = 0.1", "mesh, α = 0.1, closed"]
+GROUPS = ["contact", "fracture"]
 
 
 def cloud_of(row):
@@ -118,17 +120,17 @@ def summary(page, table):
     page.add(markdown_table(["", "phyxels", *ways], cells))
 
 
-def summary_of_contact(page, table):
-    """Adds the errors of the problems of contact, each beside its time."""
+def summary_of_group(page, table, group):
+    """Adds the errors of a group of problems, each beside its time."""
     there = {way_of(row) for row in table.rows}
-    ways = [way for way in SUMMARY_OF_CONTACT if way in there]
+    ways = [way for way in SUMMARY_OF_GROUPS if way in there]
     beside = table.fact("beside")  # what ran beside it, if someone has added that to the table
-    page.paragraph("## Contact")
-    page.paragraph("Errors at the finest resolution of each problem of contact, `phyxel accuracy contact`, each with the time from "
+    page.paragraph(f"## {group.capitalize()}")
+    page.paragraph(f"Errors at the finest resolution of each problem of {group}, `phyxel accuracy {group}`, each with the time from "
                    f"the scene to the answer. Measured by {measured_by(table)}{beside and '; ' + beside}.")
     page.add(markdown_table(["", "phyxels", *ways], [
         [name, f"{most:g}", *(f"{short_error(row.number('error'))} in {time_of(row):.2g} s" if row else "–" for row in finest)]
-        for name, finest, most in finest_rows(table, ways, "contact")]))
+        for name, finest, most in finest_rows(table, ways, group)]))
 
 
 def beside_lammps(page, results):
@@ -277,7 +279,7 @@ def styles_of(tables):
 def make(results, link):
     """The page. Raises PageError if accuracy.csv is missing."""
     table = read_table(results / "accuracy.csv")
-    contact = read_if_there(results / "accuracy_contact.csv")
+    groups = {name: read_if_there(results / f"accuracy_{name}.csv") for name in GROUPS}
     page = Page(link)
     cases = problems()["cases"]
     page.paragraph(HEAD)
@@ -289,15 +291,16 @@ def make(results, link):
     apart = "".join(f"; {', '.join(names)} by {program}" for program, names in since.items())
     page.paragraph(f"Measured by {measured_by(table)}{apart}.")
     summary(page, table)
-    if contact:
-        summary_of_contact(page, contact)
+    for group, own in groups.items():
+        if own:
+            summary_of_group(page, own, group)
     beside_lammps(page, results)
     calculix.section(page, results)
     contact_peers.section(page, results)
     hourglass(page, results)
-    styles = styles_of([table, contact] if contact else [table])
+    styles = styles_of([table, *(of_group for of_group in groups.values() if of_group)])
     for case in cases:
-        own = contact if case["group"] == "contact" else table
+        own = groups[case["group"]] if case["group"] else table
         for quantity in own.values("quantity", case=case["name"]) if own else ():
             section(page, own, case, quantity, styles)
     for study in problems()["studies"]:
