@@ -8,6 +8,7 @@
 #include <numbers>
 #include <optional>
 
+#include "model/notch.hpp"
 #include "model/parts.hpp"
 #include "model/selection.hpp"
 #include "phyxel/custom_law.hpp"
@@ -248,28 +249,40 @@ void find_fracture(Model& model, const Scene& scene) {
   }
 }
 
+namespace {
+
+/// The distance of the farthest neighbour of a phyxel [m].
+double reach_of(const Model& model, Index i) {
+  double square = 0;
+  for (const Index j : model.neighbourhood.neighbours.row(i)) {
+    const Vec3d x = model.position[j] - model.position[i];
+    square = std::max(square, dot(x, x));
+  }
+  return (1 + 1e-9) * std::sqrt(square);  // with the rounding of what lies at the end of a way
+}
+
+}  // namespace
+
 std::vector<PhyxelPair> notched_pairs(const Model& model, const Scene& scene) {
   std::vector<PhyxelPair> pairs;
   if (!model.fracture.notched) return pairs;
   for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
     for (std::size_t k = 0; k < scene.bodies[b].notches.size(); ++k) {
-      const NotchRequest& notch = scene.bodies[b].notches[k];
-      const Vec3d normal = normalised(notch.normal);
+      const NotchRequest& request = scene.bodies[b].notches[k];
+      const Notch notch(request, scene.bodies[b]);
       std::int64_t cut = 0;
       for (const Part& part : model.parts) {
         if (part.body != static_cast<Index>(b)) continue;
         for (Index i = part.begin; i < part.owned_end(); ++i) {
-          const Vec3d from = model.position[i] - notch.centre;
-          const double height = dot(normal, from);
+          const Vec3d x = model.position[i];
+          const std::vector<std::size_t> near = notch.near(x, reach_of(model, i));
+          if (near.empty()) continue;
           for (const Index j : model.neighbourhood.neighbours.row(i)) {
-            const Vec3d to = model.position[j] - notch.centre;
-            const double other = dot(normal, to);
-            // A phyxel in the plane lies above it.
-            if ((height < 0) == (other < 0)) continue;
-            const Vec3d through = from + (height / (height - other)) * (to - from);
-            if (dot(through, through) > notch.radius * notch.radius) continue;
-            const Index a = model.global_id(i), c = model.global_id(j);
-            pairs.push_back({std::min(a, c), std::max(a, c)});
+            // Both ends ask about the same way, so that ranks agree.
+            const Index c = model.global_id(i), d = model.global_id(j);
+            const Vec3d y = model.position[j];
+            if (!(c < d ? notch.cuts(x, y, near) : notch.cuts(y, x, near))) continue;
+            pairs.push_back({std::min(c, d), std::max(c, d)});
             ++cut;
           }
         }
@@ -277,9 +290,9 @@ std::vector<PhyxelPair> notched_pairs(const Model& model, const Scene& scene) {
       if (model.share) cut = model.share->communicator->largest(static_cast<double>(cut)) > 0;
       if (cut > 0) continue;
       const std::string why = fmt::format(
-          "{}{}body \"{}\": body.notch {} cuts no pair of phyxels; allowed: a disc that "
-          "cuts the body, once it is in place",
-          notch.where, notch.where.empty() ? "" : ": ", scene.bodies[b].name, k + 1);
+          "{}{}body \"{}\": body.notch {} cuts no pair of phyxels; allowed: a disc or "
+          "surface that cuts the body, once it is in place",
+          request.where, request.where.empty() ? "" : ": ", scene.bodies[b].name, k + 1);
       if (model.share) throw AgreedError(ExitCode::bad_input, why);
       throw InputError(why);
     }

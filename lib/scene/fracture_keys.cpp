@@ -22,12 +22,15 @@ std::vector<SceneKey> fracture_keys() {
        .meaning = "Of the scatter; the same seed, the same critical stretches, on any device and any number of ranks."},
       {.section = "body.fracture", .name = "unbreakable", .type = KeyType::tables, .otherwise = "none",
        .meaning = "Regions whose phyxels break from no other."},
-      {.section = "body.notch", .name = "centre", .type = KeyType::vector, .unit = "m", .required = true, .range = within(10 * longest),
+      {.section = "body.notch", .name = "centre", .type = KeyType::vector, .unit = "m", .otherwise = "required without `mesh`", .range = within(10 * longest),
        .meaning = "Of the disc, once the body is in place."},
-      {.section = "body.notch", .name = "normal", .type = KeyType::vector, .required = true, .range = within(longest),
+      {.section = "body.notch", .name = "normal", .type = KeyType::vector, .otherwise = "required with `centre`", .range = within(longest),
        .meaning = "Direction across the disc; not zero."},
-      {.section = "body.notch", .name = "radius", .unit = "m", .required = true, .range = between(shortest, 10 * longest),
+      {.section = "body.notch", .name = "radius", .unit = "m", .otherwise = "required with `centre`", .range = between(shortest, 10 * longest),
        .meaning = "Of the disc."},
+      {.section = "body.notch", .name = "mesh", .type = KeyType::path, .otherwise = "required without `centre`",
+       .meaning = "A file with a surface (OBJ, PLY or STL), open or closed, in place of a disc: it is placed as the body is, scaled, turned and "
+           "moved."},
   };
 }
 

@@ -4,6 +4,7 @@
 
 #include "phyxel/error.hpp"
 #include "scene/scene_body.hpp"
+#include "scene/scene_source.hpp"
 
 namespace phyxel {
 namespace {
@@ -32,6 +33,14 @@ FractureRequest read_fracture(const SceneTable& table) {
 
 NotchRequest read_notch(const SceneTable& table) {
   NotchRequest notch{.where = table.where()};
+  table.expect_one_of({"centre", "mesh"});
+  table.expect_together("centre", "normal");
+  table.expect_together("centre", "radius");
+  table.read("mesh", notch.mesh);
+  if (!notch.mesh.empty()) {
+    check_file_exists(table, "mesh", notch.mesh);
+    return notch;
+  }
   table.read("centre", notch.centre);
   table.read("normal", notch.normal);
   table.read("radius", notch.radius);
@@ -51,7 +60,7 @@ void move_fracture(BodyRequest& copy, Vec3d by) {
 void check_fracture_request(const Scene& scene) {
   for (const BodyRequest& body : scene.bodies) {
     for (const NotchRequest& notch : body.notches) {
-      if (notch.normal != Vec3d{}) continue;
+      if (notch.normal != Vec3d{} || !notch.mesh.empty()) continue;
       refuse(notch.where, body, "key body.notch.normal: [0, 0, 0] found; allowed: a direction");
     }
     if (!body.fracture) continue;

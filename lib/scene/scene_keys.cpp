@@ -269,7 +269,7 @@ std::vector<SceneKey> body_keys() {
       {.section = "body", .name = "fracture", .type = KeyType::table, .otherwise = "the body does not break",
        .meaning = "How the body breaks."},
       {.section = "body", .name = "notch", .type = KeyType::tables, .otherwise = "none",
-       .meaning = "Discs along which the body is cut before it moves."},
+       .meaning = "Discs and surfaces along which the body is cut before it moves."},
 
       {.section = "body.material", .name = "young", .unit = "Pa", .otherwise = "required by laws that have it",
        .range = between(1e-12, stiffest), .meaning = "Young's modulus E: rubber 1e6, jelly 1e4."},

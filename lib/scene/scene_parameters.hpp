@@ -202,6 +202,7 @@ void visit_notches(const BodyRequest& body, Visit&& visit) {
   for (std::size_t k = 0; k < body.notches.size(); ++k) {
     const NotchRequest& notch = body.notches[k];
     visit(k + 1, notch, [&](auto&& inner) {
+      if (!notch.mesh.empty()) return inner("body.notch", "mesh", notch.mesh.string());
       inner("body.notch", "centre", notch.centre);
       inner("body.notch", "normal", notch.normal);
       inner("body.notch", "radius", notch.radius);

@@ -49,12 +49,12 @@ std::vector<SceneSection> boundary_sections() {
        "Brittle fracture: two neighbours of the body above break apart for good where their distance grows beyond a critical share, which follows "
        "from `energy_release_rate`, the stiffness and the distance between phyxels. Needs an elastic law with `young` and `poisson` from 0 to "
        "0.35, hourglass control of 0.05 to 0.2, symmetric lists, and `neighbours.factor` of 1.55 to 1.88; without viscosity and volume stiffness. "
-       "Where materials meet, the weaker phyxel of a pair decides. The energy that breaking takes is a column of `energy.csv`. Faces of cracks do not touch each other."},
+       "Where materials meet, the weaker phyxel of a pair decides. The energy that breaking takes is a column of `energy.csv`. Faces of cracks do not pass through each other, and do not rub."},
       {"body.fracture.unbreakable", "[[body.fracture.unbreakable]]", "selection",
        "A `box` or a `ball` whose phyxels break from no other."},
       {"body.notch", "[[body.notch]]", "",
-       "A disc along which the body above is cut before it moves: phyxels on different sides of the disc, whose connection crosses it, are no neighbours. "
-       "A phyxel in its plane counts as above it. Faces of notches do not touch each other."},
+       "A disc, or a surface from a file, along which the body above is cut before it moves: phyxels on different sides, whose connection crosses it, "
+       "are no neighbours. A phyxel in its plane counts as above it. Faces of notches do not pass through each other, and do not rub."},
       {"obstacle", "[[obstacle]]", "",
        "A rigid body that others cannot enter: a floor, a wall, a bin, a punch, or, with a `density`, a free body. `shape` needs its lengths: `size` of a box, "
        "`radius` of a sphere, `radius` and `length` of a cylinder or capsule. It is turned, then moved into place, and rests "

@@ -93,6 +93,13 @@ TEST_F(FractureOfRuns, WrongInputIsRefusedWithWhatIsAllowed) {
              "energy_release_rate = 50\n[[body.notch]]\ncentre = [0, 0, 0]\n"
              "normal = [0, 0, 0]\nradius = 0.1\n",
          {"scene.toml:16", "normal", "a direction"});
+  expect(material + "energy_release_rate = 50\n[[body.notch]]\ncentre = [0, 0, 0]\n",
+         {"scene.toml:15", "body.notch.centre", "without normal"});
+  expect(material + "energy_release_rate = 50\n[[body.notch]]\nmesh = 'none.obj'\n",
+         {"scene.toml:15", "none.obj"});
+  write("line.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n");
+  expect(material + "energy_release_rate = 50\n[[body.notch]]\nmesh = 'line.obj'\n",
+         {"scene.toml:14", "line.obj"});
   expect(
       "[body.material]\nyoung = 1e6\npoisson = 0.45\ndensity = 1000\n[body.fracture]\n"
       "energy_release_rate = 50\n",

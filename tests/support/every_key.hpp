@@ -317,6 +317,8 @@ box = [[0, 0, 0], [1, 1, 1]]
 centre = [0, 0, 1] # body.notch.centre => centre = [0, 0, 2]
 normal = [0, 0, 1] # body.notch.normal => normal = [0, 1, 1]
 radius = 2 # body.notch.radius => radius = 3
+[[body.notch]]
+mesh = 'a.obj' # body.notch.mesh => mesh = 'b.obj'
 [[probe]]
 name = 'tip' # probe.name => name = 'top'
 body = 'third' # probe.body => body = 'fourth'

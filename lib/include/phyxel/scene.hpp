@@ -192,12 +192,13 @@ struct FractureRequest {
   std::string where = {};              ///< "scene.toml:30:1", for errors.
 };
 
-/// A disc along which a body is cut before it moves, once the body is in place.
+/// A disc or a surface along which a body is cut before it moves, once the body is in place.
 struct NotchRequest {
-  Vec3d centre;            ///< [m]
-  Vec3d normal;            ///< Not zero.
-  double radius = 0;       ///< [m]
-  std::string where = {};  ///< "scene.toml:30:1", for errors.
+  Vec3d centre;                     ///< [m]
+  Vec3d normal;                     ///< Not zero.
+  double radius = 0;                ///< [m]
+  std::filesystem::path mesh = {};  ///< In place of the disc: triangles, placed as the body is.
+  std::string where = {};           ///< "scene.toml:30:1", for errors.
 };
 
 /// One body of a scene.

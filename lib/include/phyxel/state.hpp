@@ -69,7 +69,7 @@ struct State {
   /// What the laws remember, column by column (phyxel/history.hpp). Empty for the virgin material,
   /// and for laws that remember nothing.
   std::vector<HistoryColumn> history;
-  /// Time from the history to the displacements [s]: the last step, after Verlet's; 0: they belong
+  /// Time from the history to the displacements [s]: that of the last step; 0: they belong
   /// together, so that nothing has a rate; `endless_time` of a search for rest.
   double history_interval = 0;
   double time = 0;  ///< t [s] = step * dt.

@@ -337,11 +337,11 @@ TEST(Fracture, CostsNothingWhereNothingBreaks) {
   EXPECT_TRUE(other.state().broken.empty());
 }
 
-TEST(Fracture, NotchesAndUnbreakableRegionsActWhereTheyAre) {
+TEST_F(FractureFiles, NotchesAndUnbreakableRegionsActWhereTheyAre) {
   Scene scene = one_body({.young = 1e6, .poisson = 0.25, .density = 1000, .hourglass = 0.1});
   BodyRequest& body = scene.bodies[0];
-  // Between the layers at 0.175 and 0.225 m, up to x = 0.2 m.
-  body.notches.push_back({.centre = {-10, 0.2, 0.1}, .normal = {0, 2, 0}, .radius = 10.2});
+  // Between the layers at 0.175 and 0.225 m, up to x = 0.195 m.
+  body.notches.push_back({.centre = {-10, 0.2, 0.1}, .normal = {0, 2, 0}, .radius = 10.195});
   const Model model = model_of(scene, lattice(8, 8, 4, 0.05));
   const std::vector<PhyxelPair> pairs = notched_pairs(model, scene);
   ASSERT_FALSE(pairs.empty());
@@ -351,7 +351,12 @@ TEST(Fracture, NotchesAndUnbreakableRegionsActWhereTheyAre) {
     const double share = (0.2 - a.y) / (b.y - a.y);
     EXPECT_LT(a.x + share * (b.x - a.x), 0.2 + 1e-6);
   }
-  body.notches[0].centre = {-20, 0.2, 0.1};
+  // The same by a square of two triangles, which ends at the same x.
+  body.notches[0] = {.mesh = write("cut.obj",
+                                   "v -1 0.2 -1\nv 0.195 0.2 -1\nv 0.195 0.2 1\nv -1 0.2 1\n"
+                                   "f 1 2 3\nf 1 3 4\n")};
+  EXPECT_EQ(notched_pairs(model, scene), pairs);
+  body.notches[0] = {.centre = {-20, 0.2, 0.1}, .normal = {0, 1, 0}, .radius = 10};
   EXPECT_THROW(notched_pairs(model, scene), InputError);
   body.notches.clear();
 
