@@ -18,7 +18,7 @@ Notch::Notch(const NotchRequest& request, const BodyRequest& body) : disc_(reque
   }
   Surface surface = read_mesh(request.mesh);
   place(surface.position, body);
-  for (const auto& corners : surface.triangles) {
+  for (const auto& corners : surface.triangle) {
     const std::array<Vec3d, 3> x{surface.position[corners[0]], surface.position[corners[1]],
                                  surface.position[corners[2]]};
     const Vec3d first = x[1] - x[0], second = x[2] - x[0];
