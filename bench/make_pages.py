@@ -4,12 +4,13 @@ typed by hand.
 
     bench/make_pages.py                         all pages
     bench/make_pages.py accuracy                this page alone, of: performance, scaling, accuracy, laws,
-                                                contact, cpu, readme
+                                                contact, cpu, readme, gallery
     bench/make_pages.py --check                 writes nothing; fails if a page is not up to date
 
 performance, scaling, accuracy, laws and contact are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
-README.md. An error leaves all pages as they were. Drawing needs matplotlib 3.6 or later. --check needs Python alone: it
-compares the text, since charts differ from one version of matplotlib to the next.
+README.md; gallery is docs/gallery.md, which is made from the first comments of examples/, with pictures by
+scripts/draw_gallery.py. An error leaves all pages as they were. Drawing needs matplotlib 3.6 or later. --check needs Python
+alone: it compares the text, since charts differ from one version of matplotlib to the next.
 
 The tables come from scripts/measure_gpu.sh, measure_accuracy.py, measure_contact_examples.py and profile_gpu.sh,
 bench/compare/*.py, and
@@ -36,7 +37,7 @@ import sys
 import tempfile
 
 sys.dont_write_bytecode = True
-from pages import accuracy, charts, contact, cpu, laws, performance, scaling  # noqa: E402
+from pages import accuracy, charts, contact, cpu, gallery, laws, performance, scaling  # noqa: E402
 from pages.tables import PageError, markdown_link  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -67,6 +68,9 @@ def made(names, results, out, readme):
             except FileNotFoundError:
                 raise PageError(f"{readme}: no such file; allowed: a README with a table of speeds") from None
             continue
+        if name == "gallery":
+            texts[out / "gallery.md"] = gallery.make(ROOT, out).text()
+            continue
         file = results / "README.md" if name == "cpu" else out / f"{name}.md"
         link = markdown_link(os.path.relpath(results, file.parent))
         page = PAGES[name].make(results, "" if link == "." else link + "/")
@@ -94,10 +98,11 @@ def run(options):
     if not results.is_dir():
         raise PageError(f"{results}: no such folder; allowed: one with tables of measurements")
     out = options.out or results.resolve().parent
-    readme = options.readme or (ROOT / "README.md" if results.resolve() == ROOT / "docs/results" else None)
+    own = results.resolve() == ROOT / "docs/results"
+    readme = options.readme or (ROOT / "README.md" if own else None)
     if "readme" in options.pages and not readme:
         raise PageError(f"{results}: not the project's own tables; allowed: these, or --readme with the page readme")
-    names = options.pages or [*PAGES, *(["readme"] if readme else [])]
+    names = options.pages or [*PAGES, *(["readme"] if readme else []), *(["gallery"] if own else [])]
     texts, drawings = made(names, results, out, readme)
     if options.check:
         found = differences(texts, drawings, [] if options.pages else results.glob("*.svg"))
@@ -123,9 +128,9 @@ def main(arguments=None):
     parser.add_argument("--readme", type=pathlib.Path, help="README.md, with the project's own tables; else none")
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 if a page is not up to date")
     options = parser.parse_args(arguments)
-    unknown = [name for name in options.pages if name not in (*PAGES, "readme")]
+    unknown = [name for name in options.pages if name not in (*PAGES, "readme", "gallery")]
     if unknown:
-        parser.error(f"page {unknown[0]}: unknown; allowed: {', '.join(PAGES)}, readme")
+        parser.error(f"page {unknown[0]}: unknown; allowed: {', '.join(PAGES)}, readme, gallery")
     try:
         return run(options)
     except PageError as error:

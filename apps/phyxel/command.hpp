@@ -16,6 +16,7 @@ void add_bench(CLI::App& program);
 void add_accuracy(CLI::App& program);
 void add_paper(CLI::App& program);
 void add_doctor(CLI::App& program);
+void add_examples(CLI::App& program);
 void add_completion(CLI::App& program);
 
 }  // namespace phyxel::app

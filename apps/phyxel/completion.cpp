@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "command.hpp"
+#include "example_list.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -46,14 +47,19 @@ std::vector<std::string> subcommands_of(const CLI::App& app) {
   return names;
 }
 
-/// The bash script: a function that offers the options and subcommands of the command typed so far,
+/// Words that may follow a command: its subcommands, or names of examples.
+std::vector<std::string> words_after(const std::string& path, const CLI::App& app) {
+  return path == "examples copy" ? example_names() : subcommands_of(app);
+}
+
+/// The bash script: a function that offers the options and next words of the command typed so far,
 /// or else files.
 std::string bash_script(const CLI::App& program) {
   std::string known, options, subcommands;
   for (const auto& [path, app] : commands_of(program)) {
     if (!path.empty()) known += fmt::format("{}\"{}\"", known.empty() ? "" : "|", path);
     options += fmt::format("    \"{}\") options=\"{}\"", path, fmt::join(options_of(*app), " "));
-    options += fmt::format("; commands=\"{}\" ;;\n", fmt::join(subcommands_of(*app), " "));
+    options += fmt::format("; commands=\"{}\" ;;\n", fmt::join(words_after(path, *app), " "));
   }
   return fmt::format(R"bash(# phyxel in bash: eval "$(phyxel completion bash)"
 _phyxel() {{
@@ -117,6 +123,10 @@ std::string fish_script(const CLI::App& program) {
     for (const CLI::App* sub : app->get_subcommands([](const CLI::App*) { return true; })) {
       script += fmt::format("complete -c phyxel -n {} -f -a {} -d {}\n", when, sub->get_name(),
                             fish_text(sub->get_description()));
+    }
+    if (path == "examples copy") {
+      script += fmt::format("complete -c phyxel -n {} -f -a {}\n", when,
+                            fish_text(fmt::format("{}", fmt::join(example_names(), " "))));
     }
     for (const CLI::Option* option : app->get_options()) {
       for (const std::string& name : option->get_lnames()) {

@@ -39,7 +39,8 @@ int main(int argc, char** argv) {
   program.require_subcommand(1);
   program.footer(
       "Examples:\n"
-      "  phyxel run examples/dino/scene.toml             simulate, write, draw\n"
+      "  phyxel examples copy dino                       copy one of the examples\n"
+      "  phyxel run dino/scene.toml                      simulate, write, draw\n"
       "  phyxel sample bunny.obj --phyxels 5000 --out bunny.h5\n"
       "  phyxel info out/dino/phyxels.hdf.series         show the content of a file\n"
       "\n"
@@ -56,6 +57,7 @@ int main(int argc, char** argv) {
   phyxel::app::add_bench(program);
   phyxel::app::add_accuracy(program);
   phyxel::app::add_paper(program);
+  phyxel::app::add_examples(program);
   phyxel::app::add_doctor(program);
   phyxel::app::add_completion(program);
   return phyxel::app::run_program(program, argc, argv, [&] { check_ranks(program); });

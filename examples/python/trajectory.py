@@ -1,8 +1,7 @@
-"""From a scene file to a plot: run it, read its trajectory back, and look at the energies.
+"""From a scene to a plot: run it, read its trajectory back, and look at the energies.
 
     python3 trajectory.py [picture.png]
 """
-import pathlib
 import sys
 import tempfile
 
@@ -13,7 +12,19 @@ import numpy as np
 
 import phyxel
 
-SCENE = pathlib.Path(__file__).parent.parent / "spinning_block" / "scene.toml"
+SCENE = """
+title = "Spinning block"
+time = { end = 4 }                                        # s
+solver = { precision = "double" }
+output = { frames_per_second = 25 }
+
+[[body]]
+shape = "block"                                           # centred on the origin
+size = [0.4, 0.3, 0.2]                                    # m; y is the axis of the middle moment of inertia
+phyxels = 1500                                            # about
+spin = [0.1, 10, 0]                                       # rad/s; the first number tips it over
+material = { young = 1e5, poisson = 0.3, density = 1000 } # Pa, 1, kg/m^3
+"""
 
 with tempfile.TemporaryDirectory() as folder:
     simulation = phyxel.Simulation(SCENE)

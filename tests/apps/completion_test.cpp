@@ -40,6 +40,7 @@ class Completion : public test::Program {
     EXPECT_THAT(offered({"accuracy", "hard", "--pre"}), ElementsAre("--precision"));
     EXPECT_THAT(offered({"render", "--"}), IsSupersetOf({"--frames", "--view", "--help"}));
     EXPECT_THAT(offered({"sample", "--frames"}), IsEmpty());
+    EXPECT_THAT(offered({"examples", "copy", "bin"}), ElementsAre("bin_of_dinos"));
   }
 };
 

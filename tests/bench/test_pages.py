@@ -256,7 +256,7 @@ def test_nothing_is_written_where_a_table_is_wrong(tmp_path, capsys):
 
 @pytest.mark.parametrize("arguments, words", [
     (["--results", "nowhere"], "nowhere: no such folder; allowed: one with tables"),
-    (["speed"], "page speed: unknown; allowed: performance, scaling, accuracy, laws, contact, cpu, readme"),
+    (["speed"], "page speed: unknown; allowed: performance, scaling, accuracy, laws, contact, cpu, readme, gallery"),
     (["readme", "--results", "."], "not the project's own tables"),
     (["readme", "--results", ".", "--readme", "none.md"], "none.md: no such file"),
     (["readme", "--results", ".", "--readme", "bare.md"], "bare.md: has no lines \"<!-- speed: made by"),

@@ -5,10 +5,21 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "embedded_files.hpp"
 #include "outside_text.hpp"
-#include "report/page_files.hpp"
 
 namespace phyxel::app {
+namespace {
+
+/// The content of the embedded file of that name; empty if there is none.
+std::string_view page_file(std::string_view name) {
+  for (const EmbeddedFile& file : page_files()) {
+    if (file.name == name) return file.content;
+  }
+  return {};
+}
+
+}  // namespace
 
 std::string filled_page(std::string_view name, const Fillings& fillings) {
   std::string_view rest = page_file(name);
