@@ -7,8 +7,8 @@ typed by hand.
                                                 contact, cpu, readme, gallery
     bench/make_pages.py --check                 writes nothing; fails if a page is not up to date
 
-performance, scaling, accuracy, laws and contact are docs/<name>.md; cpu is docs/results/README.md; readme is the table of speeds in
-README.md; gallery is docs/gallery.md, which is made from the first comments of examples/, with pictures by
+performance, scaling, accuracy, laws and contact are docs/<name>.md; cpu is docs/results/README.md; readme is what README.md
+has of the tables; gallery is docs/gallery.md, which is made from the first comments of examples/, with pictures by
 scripts/draw_gallery.py. An error leaves all pages as they were. Drawing needs matplotlib 3.6 or later. --check needs Python
 alone: it compares the text, since charts differ from one version of matplotlib to the next.
 
@@ -37,7 +37,7 @@ import sys
 import tempfile
 
 sys.dont_write_bytecode = True
-from pages import accuracy, charts, contact, cpu, gallery, laws, performance, scaling  # noqa: E402
+from pages import accuracy, charts, contact, cpu, gallery, laws, performance, readme, scaling  # noqa: E402
 from pages.tables import PageError, markdown_link  # noqa: E402
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -58,15 +58,15 @@ def write_whole(file, content):
         raise
 
 
-def made(names, results, out, readme):
+def made(names, results, out, readme_file):
     """Generates pages: their texts and their charts, each by its file."""
     texts, drawings = {}, {}
     for name in names:
         if name == "readme":
             try:
-                texts[readme] = cpu.with_speeds(readme, readme.read_text(encoding="utf-8"), results)
+                texts[readme_file] = readme.with_blocks(readme_file, readme_file.read_text(encoding="utf-8"), results)
             except FileNotFoundError:
-                raise PageError(f"{readme}: no such file; allowed: a README with a table of speeds") from None
+                raise PageError(f"{readme_file}: no such file; allowed: a README with a table of speeds") from None
             continue
         if name == "gallery":
             texts[out / "gallery.md"] = gallery.make(ROOT, out).text()
@@ -99,11 +99,11 @@ def run(options):
         raise PageError(f"{results}: no such folder; allowed: one with tables of measurements")
     out = options.out or results.resolve().parent
     own = results.resolve() == ROOT / "docs/results"
-    readme = options.readme or (ROOT / "README.md" if own else None)
-    if "readme" in options.pages and not readme:
+    readme_file = options.readme or (ROOT / "README.md" if own else None)
+    if "readme" in options.pages and not readme_file:
         raise PageError(f"{results}: not the project's own tables; allowed: these, or --readme with the page readme")
-    names = options.pages or [*PAGES, *(["readme"] if readme else []), *(["gallery"] if own else [])]
-    texts, drawings = made(names, results, out, readme)
+    names = options.pages or [*PAGES, *(["readme"] if readme_file else []), *(["gallery"] if own else [])]
+    texts, drawings = made(names, results, out, readme_file)
     if options.check:
         found = differences(texts, drawings, [] if options.pages else results.glob("*.svg"))
         for difference in found:

@@ -123,32 +123,59 @@ def in_words(ratios):
     return ", ".join(said)
 
 
-def table_of_least(page, table, quantities):
+class Least:
+    """The least costs of both programs: the cells of the table, and pairs of a ratio, phyxel over CalculiX, and its row's name."""
+
+    def __init__(self, table):
+        self.cells, self.times, self.uniform_times, self.memory = [], [], [], []
+        self.missed = dict.fromkeys((*PROGRAMS, "uniform"), 0)
+        for case, quantity in quantities_of(table):
+            found = families(table, case, quantity)
+            for level in LEVELS:
+                self._add(found, f"{case}: {quantity}", level)
+
+    def _add(self, found, name, level):
+        peer, own = (least(found, program, level, "cpu_seconds") for program in PROGRAMS)
+        uniform = least(found, "CalculiX", level, "cpu_seconds", "uniform")
+        peer_memory, own_memory = (least(found, program, level, "memory_mib") for program in PROGRAMS)
+        for kept, a, b in ((self.times, own, peer), (self.uniform_times, own, uniform), (self.memory, own_memory, peer_memory)):
+            if a and b:
+                kept.append((a[0] / b[0], name))
+        for who, cost in (("CalculiX", peer), ("uniform", uniform), ("phyxel", own)):
+            self.missed[who] += cost is None
+        self.cells.append([name, f"{100 * level:g}%", f"{shown(peer)} ({peer[2]})" if peer else "–", shown(uniform),
+                           f"{shown(own)} ({own[2]})" if own else "–", ratio(own, peer), shown(peer_memory), shown(own_memory),
+                           ratio(own_memory, peer_memory)])
+
+
+def quantities_of(table):
+    """The cases and quantities of the table, in its order."""
+    return list(dict.fromkeys((row["case"], row["quantity"]) for row in table.rows))
+
+
+def in_brief(results):
+    """Who needs less time and memory, for README.md; "" without a table."""
+    table = read_if_there(results / "calculix.csv")
+    costs = Least(table) if table else None
+    if not costs or not costs.times or not costs.memory:
+        return ""
+    return (f"Bodies at rest on one core, to errors of {100 * max(LEVELS):g}% to {100 * min(LEVELS):g}%, beside CalculiX. Less time: "
+            f"{in_words(costs.times)}. Less memory: {in_words(costs.memory)}.\n")
+
+
+def table_of_least(page, table):
     """Adds the table of the least costs, and its summary."""
-    cells, times, uniform_times, memory, missed = [], [], [], [], dict.fromkeys((*PROGRAMS, "uniform"), 0)
-    for case, quantity in quantities:
-        found = families(table, case, quantity)
-        for level in LEVELS:
-            peer, own = (least(found, program, level, "cpu_seconds") for program in PROGRAMS)
-            uniform = least(found, "CalculiX", level, "cpu_seconds", "uniform")
-            peer_memory, own_memory = (least(found, program, level, "memory_mib") for program in PROGRAMS)
-            for kept, a, b in ((times, own, peer), (uniform_times, own, uniform), (memory, own_memory, peer_memory)):
-                if a and b:
-                    kept.append((a[0] / b[0], f"{case}: {quantity}"))
-            for who, cost in (("CalculiX", peer), ("uniform", uniform), ("phyxel", own)):
-                missed[who] += cost is None
-            cells.append([f"{case}: {quantity}", f"{100 * level:g}%", f"{shown(peer)} ({peer[2]})" if peer else "–", shown(uniform),
-                          f"{shown(own)} ({own[2]})" if own else "–", ratio(own, peer), shown(peer_memory), shown(own_memory),
-                          ratio(own_memory, peer_memory)])
+    costs = Least(table)
     page.paragraph(LEAST)
-    for name, ratios in (("Less time", times), ("Less time, with CalculiX on uniform meshes only", uniform_times),
-                         ("Less memory", memory)):
+    for name, ratios in (("Less time", costs.times), ("Less time, with CalculiX on uniform meshes only", costs.uniform_times),
+                         ("Less memory", costs.memory)):
         if ratios:
             page.add(f"- {name}: {in_words(ratios)}.\n")
-    page.paragraph(f"- Not reached at the sizes measured: {missed['CalculiX']} of {len(cells)} rows by CalculiX, "
+    missed = costs.missed
+    page.paragraph(f"- Not reached at the sizes measured: {missed['CalculiX']} of {len(costs.cells)} rows by CalculiX, "
                    f"{missed['uniform']} by CalculiX on uniform meshes, {missed['phyxel']} by phyxel.")
     page.add(markdown_table(["", "error", "CalculiX, CPU s", "uniform", "phyxel, CPU s", "ratio", "CalculiX, MiB", "phyxel, MiB",
-                             "ratio"], cells))
+                             "ratio"], costs.cells))
 
 
 def order_of(case, rows):
@@ -199,10 +226,10 @@ def section(page, results):
     table = read_if_there(results / "calculix.csv")
     if not table:
         return
-    quantities = list(dict.fromkeys((row["case"], row["quantity"]) for row in table.rows))
+    quantities = quantities_of(table)
     page.paragraph("## Beside CalculiX")
     page.paragraph(MEASURED.format(**{name: table.fact(name) for name in ("repeats", "program", "peer", "hardware", "date")}))
     page.paragraph(ALIKE)
-    table_of_least(page, table, quantities)
+    table_of_least(page, table)
     charts(page, table, quantities)
     orders(page, table, quantities)

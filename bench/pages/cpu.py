@@ -3,7 +3,6 @@ from pages import sampling
 from pages.page import Page
 from pages.tables import PageError, markdown_table, read_if_there
 
-BEGIN, END = "<!-- speed: made by bench/make_pages.py -->\n", "<!-- end of speed -->"
 
 HEAD = """# Measurements
 
@@ -130,16 +129,11 @@ def make(results, link):
     return page
 
 
-def with_speeds(readme, text, results):
-    """The text of the README with a new table of speeds. `readme` is its name, for errors."""
-    before, begin, rest = text.partition(BEGIN)
-    _, end, after = rest.partition(END)
-    if not begin or not end:
-        raise PageError(f"{readme}: has no lines \"{BEGIN.strip()}\" and \"{END}\"; allowed: each once, in this order")
+def speeds_in_brief(results):
+    """The table of speeds in README.md; "" without tables to make it of."""
     beside = peers(results)
     rows = [row for row in beside[2] if row[0].number("particles") > 50_000] if beside else []
-    block = ""
-    if rows:
-        block = ("Millions of phyxel steps per second on a CPU (Green strain, gravity, about 32 neighbours), beside the "
-                 f"nearest peer on the same cores: {measured(beside[1])}.\n\n" + peer_table(rows).rstrip("\n") + "\n")
-    return before + BEGIN + block + END + after
+    if not rows:
+        return ""
+    return ("Millions of phyxel steps per second on a CPU (Green strain, gravity, about 32 neighbours), beside the "
+            f"nearest peer on the same cores: {measured(beside[1])}.\n\n" + peer_table(rows).rstrip("\n") + "\n")

@@ -306,6 +306,9 @@ def test_all_pages_are_written_and_checked(tmp_path, capsys):
     table = folder / "cpu_step.csv"
     table.write_text(table.read_text().replace("# date: ", "# date: later than "))
     assert "later than" in check("readme")[1]
+    typed = re.sub(r"CalculiX in \d+ of", "CalculiX in 0 of", readme.read_text())
+    readme.write_text(typed)
+    assert "CalculiX in 0 of" in check("readme")[1]
 
 
 # --- charts --------------------------------------------------------------------------------------
