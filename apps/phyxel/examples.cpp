@@ -94,8 +94,7 @@ void add_examples(CLI::App& program) {
   command->footer(
       "Examples:\n"
       "  phyxel examples\n"
-      "  phyxel examples copy dice\n"
-      "  phyxel run dice/scene.toml");
+      "  phyxel examples copy dice && phyxel run dice/scene.toml");
   command->callback([command, options] {
     if (!command->got_subcommand("copy")) list_examples(options->json);
   });

@@ -201,6 +201,9 @@ void add_simulation(py::module_& module) {
           "Largest force that Newton's method has left, of what acts.")
       .def_property_readonly(
           "device", [](const Simulation& s) { return s.backend().name(); }, "What steps, in words.")
+      .def_property_readonly(
+          "directory", [](const Simulation& s) { return s.scene().output.directory; },
+          "Output folder of the scene, as `phyxel run` takes it.")
       .def_property_readonly("warnings", [](const Simulation& s) { return s.model().warnings; })
       .def_property_readonly(
           "memory",

@@ -15,10 +15,18 @@ Lengths in m, masses in kg, times in s. Errors are `phyxel.Error`; wrong input i
 which is a ValueError, too.
 """
 
+from __future__ import annotations
+
 import csv
 import json
 import os
 import pathlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    import pandas
 
 
 def _settle_thread_policy():
@@ -41,7 +49,7 @@ from ._phyxel import read_series as _read_series
 __version__ = version.split()[1]
 __all__ = ["Cloud", "DeviceError", "DivergedError", "Error", "Frame", "InputError", "Live",
            "OutputError", "Simulation", "Trajectory", "inspect", "read_body", "read_frame",
-           "read_mesh", "sample", "shape", "to_toml", "version"]
+           "read_mesh", "run", "sample", "shape", "to_toml", "version"]
 
 
 def _text(text):
@@ -68,7 +76,7 @@ def _value(value):
     raise InputError(f"scene: {value!r} found; allowed: text, numbers, booleans, lists and dicts")
 
 
-def to_toml(scene):
+def to_toml(scene: Mapping[str, Any]) -> str:
     """The text of a scene given as a dict: what `phyxel run` reads."""
     return "".join(f"{_text(key)} = {_value(value)}\n" for key, value in scene.items())
 
@@ -83,8 +91,12 @@ class Simulation(SimulationBase):
     progress: called as progress(stage, share) while bodies are made and the step is found.
     """
 
-    def __init__(self, scene, clouds=None, *, device=None, precision=None, method=None,
-                 threads=None, step=None, end=None, unsafe_step=False, progress=None):
+    def __init__(self, scene: str | os.PathLike[str] | dict[str, Any],
+                 clouds: Mapping[str, Cloud] | None = None, *, device: str | None = None,
+                 precision: str | None = None, method: str | None = None,
+                 threads: int | None = None, step: float | None = None, end: float | None = None,
+                 unsafe_step: bool = False,
+                 progress: Callable[[str, float], object] | None = None) -> None:
         file, text = None, ""
         if isinstance(scene, dict):
             text = to_toml(scene)
@@ -98,7 +110,7 @@ class Simulation(SimulationBase):
         self._made = True
 
     @property
-    def position(self):
+    def position(self) -> numpy.ndarray:
         """Deformed positions [m], (n, 3), a copy."""
         return self.rest + self.displacement
 
@@ -109,14 +121,35 @@ class Simulation(SimulationBase):
                 f"dt = {self.dt:.3g} s, {self.device}>")
 
 
+def run(scene: str | os.PathLike[str] | dict[str, Any],
+        directory: str | os.PathLike[str] | None = None, *, force: bool = False,
+        clouds: Mapping[str, Cloud] | None = None,
+        progress: Callable[[str, float], object] | None = None, **overrides: Any) -> Trajectory:
+    """Simulates a scene, writes its frames and logs as `phyxel run` does, and returns its Trajectory.
+
+        trajectory = phyxel.run("examples/dino/scene.toml", precision="float")
+
+    scene, clouds: as for Simulation; overrides are its device, precision, method, threads, step,
+    end and unsafe_step.
+    directory: folder of the trajectory, instead of the scene's.
+    force: replace an earlier trajectory there.
+    progress: called as progress(stage, share) meanwhile.
+    """
+    simulation = Simulation(scene, clouds, progress=progress, **overrides)
+    directory = simulation.directory if directory is None else directory
+    simulation.record(directory, force)
+    simulation.run(progress=progress)
+    return Trajectory(directory)
+
+
 class _Family:
     """Frames of a trajectory, read when they are asked for."""
 
-    def __init__(self, entries):
+    def __init__(self, entries: list[tuple[str | os.PathLike[str], float]]) -> None:
         self.files = [file for file, _ in entries]
         self.times = numpy.array([time for _, time in entries])
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.files)
 
     def __getitem__(self, number):
@@ -137,7 +170,7 @@ class Trajectory:
         for frame in trajectory.surface: ...
     """
 
-    def __init__(self, directory):
+    def __init__(self, directory: str | os.PathLike[str]) -> None:
         self.directory = pathlib.Path(directory)
         families = {name: self.directory / f"{name}.hdf.series" for name in ("phyxels", "surface")}
         if not any(file.exists() for file in families.values()):
@@ -146,12 +179,12 @@ class Trajectory:
                                       for file in families.values())
 
     @property
-    def times(self):
+    def times(self) -> numpy.ndarray:
         """Of the frames [s], (frames,)."""
         return (self.phyxels if len(self.phyxels) else self.surface).times
 
     @property
-    def energy(self):
+    def energy(self) -> dict[str, numpy.ndarray]:
         """{column: values}, one for each frame; energies [J]."""
         with open(self.directory / "energy.csv", newline="") as file:
             rows = list(csv.reader(file))
@@ -159,35 +192,63 @@ class Trajectory:
         return {name.split(" [")[0]: table[:, k] for k, name in enumerate(rows[0])}
 
     @property
-    def reactions(self):
+    def reactions(self) -> dict[tuple[str, str], dict[str, numpy.ndarray]]:
         """{(body, set): {column: values}}, one for each frame; forces [N], torques [N m], work [J].
         Sets are entries of fixed, motion and symmetry, e.g. ("beam", "fixed 1"). Empty without any."""
         return self._log("reactions.csv", str)
 
     @property
-    def gases(self):
+    def gases(self) -> dict[tuple[str, str], dict[str, numpy.ndarray]]:
         """{(body, set): {column: values}}, one for each frame; pressure [Pa] and volume [m^3] of the
         gases in cavities, by tractions, e.g. ("ball", "traction 1"). Empty without any."""
         return self._log("gas.csv", str)
 
     @property
-    def contacts(self):
+    def contacts(self) -> dict[str, dict[str, numpy.ndarray]]:
         """{obstacle: {column: values}}, one for each frame; forces [N], torques [N m], impulses [N s],
         angular impulses [N m s], work, heat and loss [J]. Empty without any."""
         return {name: columns for (name, _), columns in self._log("contacts.csv", str).items()}
 
     @property
-    def rigid_bodies(self):
+    def rigid_bodies(self) -> dict[str, dict[str, numpy.ndarray]]:
         """{obstacle: {column: values}}, one for each frame, of obstacles that are free rigid bodies:
         place [m] of the centre of mass, rotation [rad] from the position at rest, velocity [m/s],
         spin [rad/s], kinetic energy [J]. Empty without any."""
         return {name: columns for (name, _), columns in self._log("rigid.csv", str).items()}
 
     @property
-    def probes(self):
+    def probes(self) -> dict[tuple[str, int], dict[str, numpy.ndarray]]:
         """{(probe, point): {column: values}}, one for each frame; points are counted from 1. Empty
         without any."""
         return self._log("probes.csv", int)
+
+    def table(self, name: str) -> pandas.DataFrame:
+        """A log as a pandas DataFrame with a row for each frame, and for each support, gas, contact,
+        body or point where a log has several: columns `time`, then the names, then the values.
+
+            trajectory.table("energy").plot(x="time", y=["kinetic_energy", "elastic_energy"])
+
+        name: energy, reactions, gases, contacts, rigid_bodies or probes. Needs pandas.
+        """
+        if name not in self._KEYS:
+            allowed = ", ".join(self._KEYS)
+            raise InputError(f"table: {name!r} found; allowed: {allowed}")
+        try:
+            import pandas  # optional
+        except ImportError:
+            raise ImportError("table: pandas is not installed; allowed: pip install pandas, or the "
+                              f"arrays of trajectory.{name}") from None
+        if name == "energy":
+            return pandas.DataFrame(self.energy)
+        parts = []
+        for key, columns in getattr(self, name).items():
+            names = dict(zip(self._KEYS[name], key if isinstance(key, tuple) else (key,)))
+            parts.append(pandas.DataFrame({"time": columns["time"], **names, **columns}))
+        return pandas.concat(parts, ignore_index=True) if parts else pandas.DataFrame()
+
+    #: Columns of names in each log.
+    _KEYS = {"energy": (), "reactions": ("body", "set"), "gases": ("body", "set"),
+             "contacts": ("obstacle",), "rigid_bodies": ("obstacle",), "probes": ("probe", "point")}
 
     def _log(self, name, second):
         """The rows of a log by their third and fourth cells, of which the latter is a `second`."""
@@ -204,7 +265,7 @@ class Trajectory:
         columns = names[:2] + names[4:]
         return {key: dict(zip(columns, numpy.array(table).T)) for key, table in sets.items()}
 
-    def __len__(self):
+    def __len__(self) -> int:
         return len(self.times)
 
     def __repr__(self):
