@@ -26,7 +26,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Path = str | os.PathLike[str]
 Mesh = Path | tuple[ArrayLike, ArrayLike]
-Progress = Callable[[str, float], object]
+Progress = Callable[[str, float], object] | None
 '''
 #: Types of parameters that are objects to pybind11, by their names; others are ArrayLike.
 PARAMETERS = {"mesh": "Mesh", "progress": "Progress", "surface": "tuple[ArrayLike, ArrayLike]",
@@ -58,7 +58,8 @@ def parameter(argument, default):
     kind = plain_type(ast.unparse(argument.annotation)) if argument.annotation else "object"
     written = ast.unparse(default) if default is not None else None
     if kind == "object":
-        kind = PARAMETERS.get(argument.arg, "ArrayLike") + (" | None" if written == "None" else "")
+        kind = PARAMETERS.get(argument.arg, "ArrayLike")
+        kind += " | None" if written == "None" and kind != "Progress" else ""
     if argument.arg == "grading":
         kind = "Mapping[str, Any] | None"
     return f"{argument.arg}: {kind}" + (f" = {written}" if written is not None else "")

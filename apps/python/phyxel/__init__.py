@@ -21,7 +21,7 @@ import csv
 import json
 import os
 import pathlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -152,7 +152,12 @@ class _Family:
     def __len__(self) -> int:
         return len(self.files)
 
-    def __getitem__(self, number):
+    @overload
+    def __getitem__(self, number: int) -> Frame: ...
+    @overload
+    def __getitem__(self, number: slice) -> list[Frame]: ...
+
+    def __getitem__(self, number: int | slice) -> Frame | list[Frame]:
         if isinstance(number, slice):
             return [read_frame(file) for file in self.files[number]]
         return read_frame(self.files[number])
@@ -226,7 +231,7 @@ class Trajectory:
         """A log as a pandas DataFrame with a row for each frame, and for each support, gas, contact,
         body or point where a log has several: columns `time`, then the names, then the values.
 
-            trajectory.table("energy").plot(x="time", y=["kinetic_energy", "elastic_energy"])
+            trajectory.table("energy").plot(x="time", y=["kinetic_energy", "strain_energy"])
 
         name: energy, reactions, gases, contacts, rigid_bodies or probes. Needs pandas.
         """

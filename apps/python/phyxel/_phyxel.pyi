@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 Path = str | os.PathLike[str]
 Mesh = Path | tuple[ArrayLike, ArrayLike]
-Progress = Callable[[str, float], object]
+Progress = Callable[[str, float], object] | None
 
 class Error(RuntimeError): ...
 
@@ -98,7 +98,7 @@ class SimulationBase:
     def __init__(self, file: Path | None, text: str, clouds: dict[str, Cloud], device: str | None, precision: str | None, method: str | None, threads: int | None, step: float | None, end: float | None, unsafe_step: bool, progress: Progress) -> None: ...
     def step(self, steps: int = 1) -> None:
         """Takes so many steps."""
-    def run(self, until: float | None = None, progress: Progress | None = None) -> None:
+    def run(self, until: float | None = None, progress: Progress = None) -> None:
         """Steps until then [s], or to the scene's end; writes frames if they are recorded.
         progress(stage, share) is called meanwhile."""
     def record(self, directory: Path, force: bool = False) -> None:
@@ -226,7 +226,7 @@ def read_mesh(file: Path) -> tuple[NDArray[Any], NDArray[Any]]:
 def read_series(file: Path) -> list[tuple[Path, float]]:
     """Reads the files and times [s] of a series: [(file, time), ...]."""
 
-def sample(mesh: Mesh, phyxels: int, seed: int = 1, relaxations: int = 30, on_surface: bool | None = None, grading: Mapping[str, Any] | None = None, progress: Progress | None = None, device: str = 'auto') -> Cloud:
+def sample(mesh: Mesh, phyxels: int, seed: int = 1, relaxations: int = 30, on_surface: bool | None = None, grading: Mapping[str, Any] | None = None, progress: Progress = None, device: str = 'auto') -> Cloud:
     """Fills a closed surface, a file (OBJ, PLY, STL) or a pair (points, triangles), with
     exactly so many phyxels. progress(stage, share) is called meanwhile. A GPU (`device`:
     auto, cpu, cuda, cuda:0, ...) helps with 20,000 phyxels and more; the cloud is the same.
