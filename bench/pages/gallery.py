@@ -15,7 +15,7 @@ program carries all examples: `phyxel examples` lists them, and `phyxel examples
 its meshes, and prints the command that runs it. `phyxel report out/dino` makes a page in which a run can be played and turned.
 
 This page is written by `bench/make_pages.py` from the first comment of each example. `scripts/draw_gallery.py` runs the scenes and \
-draws the pictures, each one frame, by `phyxel render`; *cluster* is drawn with a hundredth of its phyxels.
+draws the pictures, each one frame, by `phyxel render`; *cluster* is drawn with fewer phyxels than it has.
 
 ## Scenes"""
 SCRIPTS = """## Python

@@ -57,6 +57,8 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
            "--threads", "1", "--seconds", "0.01", "--repeat", "1", "--csv", odd + ".csv"});
   EXPECT_EQ(json_of({"bench", "sample", odd + ".obj", "--phyxels", "20"})["rows"][0]["mesh"],
             shown + ".obj");
+  EXPECT_EQ(json_of({"examples", "copy", "dice", "--to", odd + "_e"})["files"][0],
+            shown + "_e/scene.toml");
   fs::create_directory(folder_ / (odd + "_p"));
   write(odd + "_p/frames.csv",
         "body,phyxels,surfels,program,cores,threads,objects,with_surfels,"
