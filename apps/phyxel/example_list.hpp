@@ -32,6 +32,7 @@ const char* kind_name(Example::Kind kind);
 /// All examples: scenes, programs and scripts, each sorted by name.
 const std::vector<Example>& examples();
 
+/// The names of all examples, in the same order.
 std::vector<std::string> example_names();
 
 }  // namespace phyxel::app
