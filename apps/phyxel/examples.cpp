@@ -94,7 +94,7 @@ void add_examples(CLI::App& program) {
   command->footer(
       "Examples:\n"
       "  phyxel examples\n"
-      "  phyxel examples copy dice && phyxel run dice/scene.toml");
+      "  phyxel examples copy wooden_beam && phyxel run wooden_beam/scene.toml");
   command->callback([command, options] {
     if (!command->got_subcommand("copy")) list_examples(options->json);
   });
