@@ -48,6 +48,33 @@ std::array<double, 3> viridis(double t) {
   return colour;
 }
 
+/// The lower edge of a colour bar [px], and the scale of its text.
+struct BarEdge {
+  int left, bottom, width;
+  double scale;
+};
+
+/// Draws ticks below a bar, and their numbers where these do not touch the one before.
+void draw_ticks(Image& image, const ColourRange& range, const BarEdge& bar) {
+  constexpr std::uint8_t ink = 64;
+  const int length = static_cast<int>(2 * bar.scale), thick = std::max(1, length / 2);
+  const int right = image.width - static_cast<int>(2 * bar.scale);
+  int free_from = 0;
+  for (const double tick : ticks_of(range, 4)) {
+    const double share = range.share_of(tick);
+    const int x = bar.left + static_cast<int>(std::lround(share * (bar.width - thick)));
+    for (int y = bar.bottom; y < bar.bottom + length; ++y) {
+      std::fill_n(image.pixel(x, y), 3 * thick, ink);
+    }
+    const std::string number = short_number(tick);
+    const int wide = static_cast<int>(6 * bar.scale * static_cast<double>(number.size()));
+    const int from = std::min(x - wide / 2, right - wide);
+    if (from < free_from) continue;
+    draw_text(image, from, bar.bottom + static_cast<int>(4 * bar.scale), bar.scale, number);
+    free_from = from + wide + static_cast<int>(3 * bar.scale);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> colour_fields(const FrameData& frame) {
@@ -97,20 +124,15 @@ std::vector<double> shown_values(const FrameData* surface, const FrameData* phyx
 }
 
 Colour field_colour(double value, const Colouring& colouring) {
-  const double width = colouring.high - colouring.low;
-  const double t = width > 0 ? std::clamp((value - colouring.low) / width, 0.0, 1.0) : 0;
   const auto linear = [](double s) {  // of sRGB (IEC 61966-2-1)
     return static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
   };
-  const auto [r, g, b] = viridis(std::isfinite(t) ? t : 0);
+  const auto [r, g, b] = viridis(colouring.range.share_of(value));
   return {linear(r), linear(g), linear(b)};
 }
 
 void draw_colour_bar(Image& image, const Colouring& colouring) {
   const double scale = text_scale(image);
-  const auto text_width = [&](const std::string& text) {
-    return static_cast<int>(6 * scale * static_cast<double>(text.size()));
-  };
   const int margin = static_cast<int>(9 * scale), line = static_cast<int>(11 * scale);
   const int width = std::max(image.width / 4, 2), height = static_cast<int>(6 * scale);
   const int left = image.width - margin - width, top = image.height - margin - line - height;
@@ -124,13 +146,9 @@ void draw_colour_bar(Image& image, const Colouring& colouring) {
     }
   }
   const std::string unit = unit_of(colouring.field);
-  const std::string low = fmt::format("{:.3g}", colouring.low),
-                    high = fmt::format("{:.3g}", colouring.high);
   draw_text(image, left, top - line, scale,
             unit.empty() ? colouring.field : fmt::format("{} [{}]", colouring.field, unit));
-  const int below = top + height + static_cast<int>(4 * scale);
-  draw_text(image, left, below, scale, low);
-  draw_text(image, left + width - text_width(high), below, scale, high);
+  draw_ticks(image, colouring.range, {left, top + height, width, scale});
 }
 
 }  // namespace phyxel::app

@@ -6,17 +6,18 @@
 #include <vector>
 
 #include "colour.hpp"
+#include "colour_range.hpp"
 #include "phyxel/recorder.hpp"
 #include "rasteriser.hpp"
 #include "report/replay_data.hpp"
 
 namespace phyxel::app {
 
-/// A field that colours show, and the range of numbers that they span.
+/// A field that colours show, and the range of values that they span.
 struct Colouring {
-  std::string field;         ///< A name in `colour_fields`.
-  double low = 0, high = 1;  ///< In the unit of the field.
-  Carriers carriers;         ///< Of surfels, which take fields that their frames lack from phyxels.
+  std::string field;  ///< A name in `colour_fields`.
+  ColourRange range;
+  Carriers carriers;  ///< Of surfels, which take fields that their frames lack from phyxels.
 };
 
 /// Names of the fields of a frame that colours can show: numbers and vectors, whose lengths are
@@ -31,10 +32,11 @@ std::optional<std::vector<double>> field_values(const FrameData& frame, const st
 std::vector<double> shown_values(const FrameData* surface, const FrameData* phyxels,
                                  const Colouring& colouring);
 
-/// The colour of a number between `low` and `high`, in viridis.
+/// The colour of a value in viridis, by its position in the range.
 Colour field_colour(double value, const Colouring& colouring);
 
-/// Draws a bar with the colours, their range, and the field's name and unit into a corner.
+/// Draws a bar with the colours, ticks at round numbers of their range, and the field's name and
+/// unit into a corner.
 void draw_colour_bar(Image& image, const Colouring& colouring);
 
 }  // namespace phyxel::app

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
-#include <tuple>
 
 #include "drawn_obstacles.hpp"
 #include "files/atomic_file.hpp"
@@ -114,7 +113,8 @@ Colouring colouring_of(const std::vector<Shot>& shots, const std::vector<std::si
         request.colour, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
   }
   if (request.range) {
-    std::tie(colouring.low, colouring.high) = *request.range;
+    const auto [low, high] = *request.range;
+    colouring.range = {low, high, request.scale == Scale::logarithmic};
     return colouring;
   }
   constexpr std::size_t most = 1'000'000;  // values of a sample
@@ -127,7 +127,7 @@ Colouring colouring_of(const std::vector<Shot>& shots, const std::vector<std::si
       if (std::isfinite(values[i])) sample.push_back(values[i]);
     }
   }
-  std::tie(colouring.low, colouring.high) = bulk_of(std::move(sample));
+  colouring.range = colour_range(std::move(sample), request.scale);
   return colouring;
 }
 

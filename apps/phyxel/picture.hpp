@@ -20,8 +20,10 @@ struct PictureRequest {
   bool phyxels = true, surface = true;  ///< Families that are drawn, if they exist.
   FrameChoice choice;
   std::string colour;  ///< Name of a field of the frames that colours show; "": bodies differ.
-  /// Range of the colours; unset: 98% of the values of the frames that are drawn.
+  /// Range of the colours; unset: that of most values of the frames that are drawn.
   std::optional<std::pair<double, double>> range = {};
+  Scale scale =
+      Scale::automatic;  ///< Of the colours; linear if it is automatic and `range` is set.
   /// Folder of the scene, from which it names meshes; empty: the current one.
   std::filesystem::path scene_folder = {};
 };

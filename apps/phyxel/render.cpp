@@ -19,6 +19,7 @@ struct RenderOptions {
   std::filesystem::path input, out;
   PictureRequest request;
   std::vector<double> view, up, range;
+  std::string scale = "auto";
   bool no_phyxels = false, no_surface = false, force = false, json = false;
 };
 
@@ -35,6 +36,8 @@ void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
   request.view = vector_of(options.view, "--view");
   request.up = vector_of(options.up, "--up");
+  if (options.scale == "linear") request.scale = Scale::linear;
+  if (options.scale == "log") request.scale = Scale::logarithmic;
   if (!options.range.empty()) {
     if (options.range.size() != 2 || !(options.range[0] < options.range[1])) {
       throw InputError(
@@ -43,6 +46,10 @@ void render_command(const RenderOptions& options) {
                       fmt::join(options.range, ",")));
     }
     request.range = {options.range[0], options.range[1]};
+    if (request.scale == Scale::logarithmic && !(options.range[0] > 0)) {
+      throw InputError(fmt::format("--range {} with --scale log: allowed: positive numbers",
+                                   fmt::join(options.range, ",")));
+    }
   }
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
@@ -108,10 +115,19 @@ void add_render(CLI::App& program) {
       "--colour,--color", request.colour,
       "Field of the frames that colours show, with a bar: displacement, speed, von_mises, ...");
   command
-      ->add_option("--range", options->range,
-                   "Range of the colours: low,high (default: 98% of the values of the pictures)")
+      ->add_option(
+          "--range", options->range,
+          "Range of the colours: low,high (default: that of 98% of the values of the pictures, "
+          "or of 94% on a logarithmic scale)")
       ->delimiter(',')
       ->allow_extra_args(false)
+      ->needs(colour);
+  command
+      ->add_option("--scale", options->scale,
+                   "Scale of the colours: auto (logarithmic if most values crowd at the low end), "
+                   "linear or log")
+      ->check(CLI::IsMember({"auto", "linear", "log"}))
+      ->capture_default_str()
       ->needs(colour);
   command->add_option("--scene-folder", request.scene_folder,
                       "Folder of the scene, with the meshes of its obstacles (default: the current "
@@ -125,6 +141,7 @@ void add_render(CLI::App& program) {
       "  phyxel render out/dino --count 6\n"
       "  phyxel render out/dino --frames 0,10,-1 --view 0,1,0 --out pictures\n"
       "  phyxel render out/dino --colour speed --range 0,2\n"
+      "  phyxel render out/dino --count 6 --colour von_mises --scale log\n"
       "  phyxel render out/dino/surface_000010.hdf");
   command->callback([options] { render_command(*options); });
 }

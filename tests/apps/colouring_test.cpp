@@ -43,7 +43,7 @@ TEST(Colouring, SurfelsTakeMeansOfPhyxelsUnlessTheyHaveTheField) {
 }
 
 TEST(Colouring, SpansViridisAndNoMore) {
-  const Colouring colouring{.field = "mass", .low = 1, .high = 3};
+  const Colouring colouring{.field = "mass", .range = {1, 3}};
   const auto expect = [&](double value, int red, int green, int blue) {
     const Colour c = field_colour(value, colouring);
     // The polynomial is a fit of matplotlib's table, to 5 of 255.
@@ -56,9 +56,65 @@ TEST(Colouring, SpansViridisAndNoMore) {
   for (const double high : {3.0, 1e9}) expect(high, 253, 231, 37);
 }
 
+/// Values from low to high whose logarithms are evenly spaced.
+std::vector<double> crowded(double low, double high) {
+  std::vector<double> values;
+  for (int k = 0; k <= 100; ++k) values.push_back(low * std::pow(high / low, k / 100.0));
+  return values;
+}
+
+TEST(ColourRange, LeavesOutliersOut) {
+  std::vector<double> values(1000);
+  for (std::size_t k = 0; k < values.size(); ++k) values[k] = static_cast<double>(k);
+  values[3] = 1e9;
+  values[4] = -1e9;
+  values[5] = std::nan("");
+  values[6] = HUGE_VAL;
+  const ColourRange range = colour_range(values, Scale::automatic);
+  EXPECT_FALSE(range.logarithmic);
+  EXPECT_NEAR(range.low, 10, 8);
+  EXPECT_NEAR(range.high, 990, 8);
+  EXPECT_EQ(range.share_of(1e9), 1);
+  EXPECT_EQ(range.share_of(std::nan("")), 0);
+  EXPECT_NEAR(range.share_of(500), 0.5, 0.01);
+}
+
+TEST(ColourRange, IsLogarithmicWhereValuesCrowdAtTheLowEnd) {
+  const ColourRange range = colour_range(crowded(1, 1e4), Scale::automatic);
+  ASSERT_TRUE(range.logarithmic);
+  EXPECT_GE(range.high / range.low, 100);
+  EXPECT_LE(range.high / range.low, 1000.001);  // at most three decades
+  EXPECT_NEAR(range.share_of(std::sqrt(range.low * range.high)), 0.5, 1e-12);
+  EXPECT_EQ(range.share_of(0), 0);
+  EXPECT_EQ(range.share_of(-1), 0);
+  EXPECT_FALSE(colour_range(crowded(1, 1e4), Scale::linear).logarithmic);
+  std::vector<double> even, negative = crowded(1, 1e4);
+  for (int k = 1; k <= 1000; ++k) even.push_back(k);
+  EXPECT_FALSE(colour_range(even, Scale::automatic).logarithmic);
+  EXPECT_TRUE(colour_range(even, Scale::logarithmic).logarithmic);
+  negative.push_back(-1);
+  EXPECT_FALSE(colour_range(negative, Scale::logarithmic).logarithmic);
+  EXPECT_FALSE(colour_range({0, 0, 5, 5}, Scale::logarithmic).logarithmic);
+  EXPECT_FALSE(colour_range({}, Scale::logarithmic).logarithmic);
+}
+
+TEST(ColourRange, TicksAreRoundNumbersWithinIt) {
+  EXPECT_THAT(ticks_of({0.1, 2.219}, 4), ElementsAre(1, 2));
+  EXPECT_THAT(ticks_of({0, 2}, 4), ElementsAre(0, 0.5, 1, 1.5, 2));
+  EXPECT_THAT(ticks_of({-30, 55}, 4), ElementsAre(0, 50));
+  EXPECT_THAT(ticks_of({411, 1.66e5, true}, 4), ElementsAre(1e3, 1e4, 1e5));
+  EXPECT_THAT(ticks_of({3, 40, true}, 4), ElementsAre(5, 10, 20));
+  EXPECT_THAT(ticks_of({2, 2}, 4), IsEmpty());
+  EXPECT_THAT(ticks_of({1e300, HUGE_VAL}, 4), IsEmpty());
+  EXPECT_EQ(short_number(1.66e5), "1.66e5");
+  EXPECT_EQ(short_number(1e-7), "1e-7");
+  EXPECT_EQ(short_number(-0.0), "0");
+  EXPECT_EQ(short_number(0.25), "0.25");
+}
+
 TEST(Colouring, ABarSaysTheRangeAndLeavesTheRestAlone) {
   Image blank{320, 240, std::vector<std::uint8_t>(320 * 240 * 3, 255)}, image = blank;
-  draw_colour_bar(image, {.field = "speed", .low = 0, .high = 2});
+  draw_colour_bar(image, {.field = "speed", .range = {0, 2}});
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       const bool same = std::equal(image.pixel(x, y), image.pixel(x, y) + 3, blank.pixel(x, y));
@@ -100,9 +156,10 @@ density = 1000
 
 TEST_F(ColouredPictures, ShowAFieldOfThePhyxelsOnTheSurface) {
   ASSERT_EQ(run({"render", "out", "--frames", "1", "--out", "plain"}).code, 0);
-  const auto coloured = [&](const char* range, const char* out) {
-    const Outcome done = run({"render", "out", "--frames", "1", "--color", "speed", "--range",
-                              range, "--out", out, "--width", "96", "--height", "96"});
+  const auto coloured = [&](const char* range, const char* out, const char* scale = "auto") {
+    const Outcome done =
+        run({"render", "out", "--frames", "1", "--color", "speed", "--range", range, "--out", out,
+             "--width", "96", "--height", "96", "--scale", scale});
     EXPECT_EQ(done.code, 0) << done.err;
     const std::string png = test::text_of(folder_ / out / "frame_000001.png");
     EXPECT_FALSE(png.empty());
@@ -110,6 +167,8 @@ TEST_F(ColouredPictures, ShowAFieldOfThePhyxelsOnTheSurface) {
   };
   // All of the block moves at 2 m/s: it is at one end of these ranges, or at the other.
   EXPECT_NE(coloured("0,1", "high"), coloured("3,4", "low"));
+  // 2 m/s is half way between 1 and 3, and further on by logarithms.
+  EXPECT_NE(coloured("1,3", "linear"), coloured("1,3", "log", "log"));
 }
 
 TEST_F(ColouredPictures, WrongFieldsAndRangesAreRefused) {
@@ -123,6 +182,9 @@ TEST_F(ColouredPictures, WrongFieldsAndRangesAreRefused) {
   };
   refused({"--colour", "von_mises"}, "allowed: displacement, speed, velocity");
   refused({"--colour", "speed", "--range", "2,1"}, "--range 2,1: allowed: two numbers");
+  refused({"--colour", "speed", "--range", "0,1", "--scale", "log"},
+          "--range 0,1 with --scale log: allowed: positive numbers");
+  refused({"--colour", "speed", "--scale", "decades"}, "auto");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
 #include "report/page.hpp"
+#include "report/replay_data.hpp"
 #include "support/page.hpp"
 #include "support/program.hpp"
 #include "support/skips.hpp"
@@ -75,6 +76,26 @@ TEST(FramesThatFit, MotionComesBeforeDetail) {
   expect(app::plan_frames(500, 0, 1e6, 2000), 8, 4096);
   EXPECT_THROW(app::plan_frames(500, 1001, 100, 2000), InputError);
   EXPECT_EQ(app::plan_frames(1, 1000, 0, 1000).frames, 1u);
+}
+
+/// Frames of a field: at rest, all alike, and spread over its range.
+TEST(Opening, IsAtTheLiveliestFrame) {
+  const std::vector<double> rest(8, 0.0), alike(8, 1.0), spread{0, 1, 2, 3, 4, 5, 6, 7};
+  std::vector<app::Instance> instances(3);
+  instances[0].fields = {rest, rest, rest};
+  instances[1].fields = {alike, spread, rest};
+  instances[2].fields = {spread, alike, rest};
+  const std::vector<app::ColourRange> ranges(3, {0, 7});
+  const auto opening = [&](const std::vector<std::string>& names) {
+    const app::Opening found = app::opening_of(instances, names, ranges);
+    return std::pair(found.frame, found.field);
+  };
+  EXPECT_EQ(opening({"displacement", "speed", "stress (von Mises)"}), std::pair(1ul, 1ul));
+  EXPECT_EQ(opening({"displacement", "stress (von Mises)", "speed"}), std::pair(1ul, 1ul));
+  EXPECT_EQ(opening({"stress (von Mises)", "speed", "displacement"}), std::pair(2ul, 0ul));
+  EXPECT_EQ(opening({"volume ratio", "strain", "speed"}), std::pair(2ul, 0ul));
+  instances.resize(1);  // nothing moves
+  EXPECT_EQ(opening({"displacement", "speed", "strain"}), std::pair(0ul, 0ul));
 }
 
 class Reports : public test::Program {
@@ -295,10 +316,16 @@ TEST_F(Reports, WrongRequestsAreRefused) {
 TEST_F(Reports, ABrowserDrawsAReplay) {
   PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
   run_beam();
-  page_of();
+  const std::string page = page_of();
+  EXPECT_GT(data_of(page)["opening"]["frame"], 0);  // not at rest
   const std::string replay = seen_by_browser(folder_, "page.html");
   EXPECT_THAT(replay, HasSubstr("data-state=\"drawn\""));
   EXPECT_THAT(replay, HasSubstr("data-error=\"0\""));
+  EXPECT_THAT(replay, HasSubstr("data-frame=\"" + data_of(page)["opening"]["frame"].dump() + "\""));
+  // The colours have a bar with ticks.
+  EXPECT_THAT(between(text_of(folder_ / "dom.html"), "<div class=\"ticks\">", "</div>"),
+              HasSubstr("</span><span"));
+  EXPECT_THAT(seen_by_browser(folder_, "page.html#t=0"), HasSubstr("data-frame=\"0\""));
   // The beam, seen whole, covers some of the stage, not all of it.
   const double drawn = std::stod(between(replay, "data-drawn=\"", "\""));
   EXPECT_GT(drawn, 0.02);

@@ -308,14 +308,22 @@ class Replay {
     data["decimals"] = time_decimals(trajectory_.shots);
     for (const Instance& instance : instances) data["frames"].push_back(instance.time);
     data["fields"] = Json::array();
+    std::vector<ColourRange> opening_ranges;
     for (std::size_t f = 0; f < field_names_.size(); ++f) {
-      const auto [bulk_low, bulk_high] = bulk_of(instances, f);
+      const std::vector<double> sample = sample_of(instances, f);
+      const ColourRange bulk = linear_range(sample), decades = logarithmic_range(sample);
+      const bool log = prefers_logarithm(sample);
+      opening_ranges.push_back(log ? decades : bulk);
       data["fields"].push_back({{"name", field_names_[f]},
-                                {"bulk", {bulk_low, bulk_high}},
+                                {"bulk", {bulk.low, bulk.high}},
+                                {"decades", {decades.low, decades.high}},
+                                {"log", log},
                                 {"unit", field_units_[f]},
                                 {"low", ranges[f].low},
                                 {"high", ranges[f].low + ranges[f].width()}});
     }
+    const Opening opening = opening_of(instances, field_names_, opening_ranges);
+    data["opening"] = {{"frame", opening.frame}, {"field", opening.field}};
     for (const Span& side : box) {
       data["scale"].push_back(side.width() / Span::steps / radius);
       data["low"].push_back(-side.width() / 2 / radius);

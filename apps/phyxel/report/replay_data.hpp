@@ -4,9 +4,10 @@
 #include <array>
 #include <cstdint>
 #include <limits>
-#include <utility>
+#include <string>
 #include <vector>
 
+#include "colour_range.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel::app {
@@ -72,11 +73,23 @@ struct Extent {
 };
 Extent extent_of(const std::vector<Instance>& instances);
 
-/// The 1st and the 99th percentile of some values; 0 and 1 if there are none.
-std::pair<double, double> bulk_of(std::vector<double> values);
+/// A sample of a field's finite values over all frames, at most about a million.
+std::vector<double> sample_of(const std::vector<Instance>& instances, std::size_t field);
 
-/// The 1st and the 99th percentile of a field over all frames, from a sample.
-std::pair<double, double> bulk_of(const std::vector<Instance>& instances, std::size_t field);
+/// How lively the colours of a field are: the mean of their positions in the range times the
+/// standard deviation, at most 1/4; near 0 if all points have one colour.
+double liveliness(const std::vector<double>& values, const ColourRange& range);
+
+/// The frame and the field that a page opens with.
+struct Opening {
+  std::size_t frame = 0, field = 0;
+};
+
+/// Chooses the liveliest frame of a field. The field is the first of stress, speed and displacement
+/// whose liveliest frame is lively enough, or else the liveliest field.
+/// @param names,ranges shape [fields]
+Opening opening_of(const std::vector<Instance>& instances, const std::vector<std::string>& names,
+                   const std::vector<ColourRange>& ranges);
 
 /// The numbers of a frame: points of surfels and phyxels, then fields.
 std::vector<std::uint16_t> quantised(const Instance& instance, const Extent& extent);

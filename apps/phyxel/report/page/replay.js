@@ -91,7 +91,7 @@ function rampColour(t) {
 // --- drawing -------------------------------------------------------------------------------------
 const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
 const view = {}, fromTheRight = [0.398, 0.697, 0.597];  // the light of a page without obstacles
-const shown = {frame: 0, field: data.fields.length ? 0 : -1, surface: data.surfels > 0, phyxels: data.surfels === 0, obstacles: obstacles.length > 0, range: 'bulk'};
+const shown = {frame: 0, field: data.fields.length ? data.opening.field : -1, log: false, surface: data.surfels > 0, phyxels: data.surfels === 0, obstacles: obstacles.length > 0, range: 'bulk'};
 let programs = null, buffers = null;
 
 function compile(vertex, fragment) {
@@ -107,20 +107,21 @@ function compile(vertex, fragment) {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   const at = {};
-  for (const name of ['scale', 'low', 'turn', 'pose', 'eye', 'lens', 'range', 'plain', 'ball', 'parallel', 'towards', 'fade', 'ghost', 'pass', 'shade', 'depths',
+  for (const name of ['scale', 'low', 'turn', 'pose', 'eye', 'lens', 'range', 'origin', 'plain', 'ball', 'parallel', 'towards', 'fade', 'ghost', 'pass', 'shade', 'depths',
                       'lightRows', 'shaded']) at[name] = gl.getUniformLocation(program, name);
   return {program, at};
 }
 
 const place = `
 in vec3 point; in float field;
-uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel; uniform vec2 range;
+uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel; uniform vec2 range; uniform float origin;  // origin: lowest value of a field over its width; negative for linear colours
 out float value; out vec3 seen, around;
 void put() {
   around = pose * (point * scale) + low;
   seen = turn * around - eye;  // looking along -z
   gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, mix(-seen.z, 1.0, parallel));  // parallel: of a light far away
-  value = (field - range.x) / max(range.y - range.x, 1e-6);
+  value = origin < 0.0 ? (field - range.x) / max(range.y - range.x, 1e-6)
+                       : log(max(field + origin, 1e-7) / (range.x + origin)) / log((range.y + origin) / (range.x + origin));
 }`;
 
 function prepare() {
@@ -134,7 +135,7 @@ void main() {
   if (dot(n, v) < 0.0) { n = -n; out_ = -out_; }
   vec3 base = plain.x < 0.0 ? ramp(value) : plain;
   float open = lightAt(around, out_, 0.012);
-  float light = 0.35 + 0.55 * open * max(0.0, dot(n, towards)) + 0.12 * max(0.0, dot(n, v)) + 0.14 * (1.0 - open) * (1.0 + dot(n, towards));
+  float light = 0.42 + 0.52 * open * max(0.0, dot(n, towards)) + 0.12 * max(0.0, dot(n, v)) + 0.14 * (1.0 - open) * (1.0 + dot(n, towards));
   float shine = 0.18 * open * pow(max(0.0, dot(reflect(-v, n), towards)), 24.0);
   colour = vec4(base * light + shine, 1.0);
 }`);
@@ -203,30 +204,58 @@ function upload(frame) {
   uploaded = key;
 }
 
-/// What the colours span, in units of the field.
+/// What the colours span, in units of the field: low, high, and whether by their logarithms.
 function span(frame) {
-  if (shown.field < 0) return [0, 1];
   const field = data.fields[shown.field];
-  if (shown.range === 'all') return [field.low, field.high];
-  if (shown.range === 'bulk') return field.bulk;
-  const f = fieldOf(frame, frame.surfels && (shown.surface || !frame.phyxels) ? 'surfels' : 'phyxels', shown.field);
-  let low = 65535, high = 0;
-  for (const v of f) { if (v < low) low = v; if (v > high) high = v; }
-  const real = v => field.low + v / 65535 * (field.high - field.low);
-  return [real(low), real(high)];
+  if (!field) return [0, 1, false];
+  const log = shown.log && field.decades[0] > 0;
+  if (shown.range === 'bulk') return log ? [...field.decades, true] : [...field.bulk, false];
+  let [low, high] = [field.low, field.high];
+  if (shown.range === 'one') {
+    const f = fieldOf(frame, frame.surfels && (shown.surface || !frame.phyxels) ? 'surfels' : 'phyxels', shown.field);
+    let least = 65535, most = 0;
+    for (const v of f) { if (v < least) least = v; if (v > most) most = v; }
+    [low, high] = [least, most].map(v => field.low + v / 65535 * (field.high - field.low));
+  }
+  return log && high > 0 ? [Math.max(low, high / 1000), high, true] : [low, high, false];
+}
+
+/// The bar of colours, with pointed ends where values lie beyond it, and its ticks.
+function drawLegend(low, high, logarithmic) {
+  const legend = stage.querySelector('.legend'), field = data.fields[shown.field];
+  legend.hidden = !field;
+  if (!field) return;
+  legend.querySelector('.name').textContent = `${field.name}${field.unit ? ` [${field.unit}]` : ''}`;
+  const bar = legend.querySelector('canvas'), pen = bar.getContext('2d'), end = 12, width = bar.width - 2 * end, half = bar.height / 2;
+  pen.clearRect(0, 0, bar.width, bar.height);
+  for (let k = 0; k < width; ++k) {
+    pen.fillStyle = `rgb(${rampColour(k / (width - 1)).join()})`;
+    pen.fillRect(end + k, 0, 1, bar.height);
+  }
+  for (const [beyond, share, tip, base] of [[field.low < low, 0, 1, end], [field.high > high, 1, bar.width - 1, bar.width - end]]) {
+    if (!beyond) continue;
+    pen.fillStyle = `rgb(${rampColour(share).join()})`;
+    pen.beginPath(); pen.moveTo(base, 0); pen.lineTo(tip, half); pen.lineTo(base, bar.height); pen.fill();
+  }
+  let all = high > low ? ticks(low, high, 4) : [low];
+  if (logarithmic) {
+    for (const multiples of [[1], [1, 2, 5]]) {
+      all = [];
+      for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); ++power) all.push(...multiples.map(m => m * 10 ** power));
+      all = all.filter(v => v >= low && v <= high);
+      if (all.length > 1) break;
+    }
+  }
+  const share = v => high > low ? (logarithmic ? Math.log(v / low) / Math.log(high / low) : (v - low) / (high - low)) : 0;
+  const label = v => logarithmic && (v >= 1000 || v < 0.01) ? v.toExponential(0).replace('+', '') : short(+v.toPrecision(6));
+  legend.querySelector('.ticks').replaceChildren(...all.map(v => element('span', {style: `left: ${100 * (end + share(v) * width) / bar.width}%`}, label(v))));
 }
 
 function draw() {
   const frame = frameOf(shown.frame), time = frames[shown.frame];
   stage.querySelector('.clock').textContent = `t = ${time.toFixed(data.decimals)} s`;
-  const [low, high] = span(frame), field = data.fields[shown.field];
-  const legend = stage.querySelector('.legend');
-  legend.hidden = !field;
-  if (field) {
-    legend.querySelector('.name').textContent = `${field.name}${field.unit ? ` [${field.unit}]` : ''}`;
-    legend.querySelector('.low').textContent = (low > field.low ? '≤ ' : '') + short(low);
-    legend.querySelector('.high').textContent = (high < field.high ? '≥ ' : '') + short(high);
-  }
+  const [low, high, logarithmic] = span(frame), field = data.fields[shown.field];
+  drawLegend(low, high, logarithmic);
   for (const chart of charts) chart.now(time);
   if (!gl) return;
   const ratio = Math.min(2, window.devicePixelRatio || 1);
@@ -248,6 +277,7 @@ function draw() {
     gl.uniformMatrix3fv(at.turn, false, seenFrom.turn);
     gl.uniform3fv(at.eye, seenFrom.eye);
     gl.uniform4fv(at.lens, seenFrom.lens.slice(0, 4));
+    gl.uniform1f(at.origin, logarithmic ? field.low / spread : -1);
     gl.uniform1f(at.parallel, seenFrom.lens[4]);
     gl.uniform2f(at.range, field ? (low - field.low) / spread : 0, field ? (high - field.low) / spread : 1);
     gl.uniform3fv(at.towards, scene ? rows.map(row => row[0] * light.towards[0] + row[1] * light.towards[1] + row[2] * light.towards[2]) : fromTheRight);
@@ -350,6 +380,13 @@ function play() {
   };
   playing.request = requestAnimationFrame(tick);
 }
+/// Colours show a field, by the scale that suits it.
+function choose(field) {
+  const box = document.getElementById('log'), chosen = data.fields[field];
+  shown.field = field;
+  box.disabled = !chosen || !(chosen.decades[0] > 0);
+  box.checked = shown.log = !box.disabled && chosen.log;
+}
 function control() {
   slider.max = steps - 1;
   slider.addEventListener('input', () => { pause(); show(Number(slider.value)); });
@@ -362,7 +399,10 @@ function control() {
   const field = document.getElementById('field');
   field.append(element('option', {value: -1}, 'nothing'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
   field.value = shown.field;
-  field.addEventListener('change', () => { shown.field = Number(field.value); draw(); });
+  field.addEventListener('change', () => { choose(Number(field.value)); draw(); });
+  const log = document.getElementById('log');
+  log.addEventListener('change', () => { shown.log = log.checked; draw(); });
+  choose(shown.field);
   const range = document.getElementById('range');
   range.addEventListener('change', () => { shown.range = range.value; draw(); });
   for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels], ['obstacles', obstacles.length]]) {
@@ -403,11 +443,6 @@ function control() {
     if (event.key === 'End') { pause(); show(steps - 1); }
   });
   new ResizeObserver(draw).observe(canvas);
-  const legend = stage.querySelector('.legend canvas'), pen = legend.getContext('2d');
-  for (let k = 0; k < legend.width; ++k) {
-    pen.fillStyle = `rgb(${rampColour(k / (legend.width - 1)).join()})`;
-    pen.fillRect(k, 0, 1, legend.height);
-  }
 }
 
 function addTiming() {
@@ -426,6 +461,7 @@ function tell(state) {
   let drawn = 0;
   for (let k = 3; k < pixels.length; k += 4) if (pixels[k]) ++drawn;
   document.body.dataset.drawn = (drawn / (canvas.width * canvas.height)).toFixed(4);
+  document.body.dataset.frame = shown.frame;
   document.body.dataset.obstacles = scenery.parts.length;
   document.body.dataset.error = gl.getError();
 }
@@ -440,6 +476,6 @@ const colouring = data.fields.findIndex(f => f.name === asked.get('colours'));
 if (colouring >= 0) shown.field = colouring;
 startView();
 control();
-show(asked.has('t') ? nearest(Number(asked.get('t'))) : 0);
+show(asked.has('t') ? nearest(Number(asked.get('t'))) : data.opening.frame);
 tell(gl ? 'drawn' : 'no WebGL 2');
 if (asked.has('play')) play();
