@@ -11,6 +11,7 @@ build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev 
        libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev
        libmetis-dev libopenmpi-dev openmpi-bin
        gnuplot-nox           # the figures of phyxel paper
+       ffmpeg                # phyxel render --video
        help2man dpkg-dev)    # the manual page, and packages
 # clang for sanitizers, fuzzers and static analysis, Doxygen for the reference, Python for the module and for independent
 # reading of files, Chromium for pages, fish and zsh for their completions, parallel HDF5 beside the serial one, and CalculiX,

@@ -51,7 +51,7 @@ fi
 # Lists missing tools without which tests are not registered or skip.
 missing_tools() {
   local tool module
-  for tool in ccx chromium doxygen dpkg-shlibdeps fish gnuplot help2man mpirun pkg-config zsh; do
+  for tool in ccx chromium doxygen dpkg-shlibdeps ffmpeg fish gnuplot help2man mpirun pkg-config zsh; do
     command -v "$tool" >/dev/null || echo "$tool"
   done
   for module in h5py matplotlib numpy pandas pytest vtkmodules; do

@@ -92,4 +92,35 @@ Camera CameraFit::camera() const {
   return fitted;
 }
 
+std::vector<Camera> orbit(const Camera& start, Vec3d up, Vec3d middle,
+                          std::span<const Vec3d> points, double degrees, std::size_t count) {
+  const Vec3d axis = norm(up) > 0 ? normalised(up) : start.up;
+  const double slope_x = filled * 0.5 * start.width / start.focal,
+               slope_y = filled * 0.5 * start.height / start.focal;
+  std::vector<Camera> cameras(count, start);
+  double distance = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double share = count > 1 ? static_cast<double>(k) / static_cast<double>(count - 1) : 0;
+    const double angle = share * degrees * std::numbers::pi / 180;
+    const auto turned = [&](Vec3d v) {  // Rodrigues' formula
+      return std::cos(angle) * v + std::sin(angle) * cross(axis, v) +
+             (1 - std::cos(angle)) * dot(axis, v) * axis;
+    };
+    Camera& camera = cameras[k];
+    camera.right = turned(start.right);
+    camera.up = turned(start.up);
+    camera.forward = turned(start.forward);
+    for (const Vec3d& point : points) {
+      const Vec3d d = point - middle;
+      if (!is_finite(d)) continue;
+      const double z = dot(d, camera.forward);
+      distance = std::max({distance, std::abs(dot(d, camera.right)) / slope_x - z,
+                           std::abs(dot(d, camera.up)) / slope_y - z});
+    }
+  }
+  if (!(distance > 0)) distance = norm(start.eye - middle);
+  for (Camera& camera : cameras) camera.eye = middle - distance * camera.forward;
+  return cameras;
+}
+
 }  // namespace phyxel::app

@@ -3,6 +3,7 @@
 
 #include <limits>
 #include <span>
+#include <vector>
 
 #include "phyxel/types.hpp"
 
@@ -50,5 +51,11 @@ class CameraFit {
   double nearest_ = infinity_, farthest_ = -infinity_;
   double low_x_ = infinity_, high_x_ = -infinity_, low_y_ = infinity_, high_y_ = -infinity_;
 };
+
+/// Cameras that go round a point from one side to another, equally far from it, and see all points.
+/// @param start first direction of view @param up axis of the turn @param middle the point [m]
+/// @param degrees angle between the first and the last camera, to the right as the viewer sees it
+std::vector<Camera> orbit(const Camera& start, Vec3d up, Vec3d middle,
+                          std::span<const Vec3d> points, double degrees, std::size_t count);
 
 }  // namespace phyxel::app

@@ -86,6 +86,26 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   return setting;
 }
 
+/// Some points of each frame, the outermost ones among them.
+std::vector<Vec3d> some_points(const std::vector<Shot>& shots) {
+  constexpr std::size_t most = 500;  // of a frame, beside the outermost ones
+  std::vector<Vec3d> points;
+  Outermost outermost;
+  for (const Shot& shot : shots) {
+    for (const fs::path& file : {shot.surface, shot.phyxels}) {
+      const auto frame = read_if_any(file);
+      if (!frame) continue;
+      const std::size_t every = 1 + frame->point.size() / most;
+      for (std::size_t k = 0; k < frame->point.size(); ++k) {
+        outermost.include(frame->point[k]);
+        if (k % every == 0) points.push_back(frame->point[k]);
+      }
+    }
+  }
+  points.insert(points.end(), outermost.points().begin(), outermost.points().end());
+  return points;
+}
+
 /// The colours that show a field of the frames.
 /// @throws InputError if the frames lack it
 Colouring colouring_of(const std::vector<Shot>& shots, const std::vector<std::size_t>& chosen,
@@ -131,6 +151,36 @@ Colouring colouring_of(const std::vector<Shot>& shots, const std::vector<std::si
   return colouring;
 }
 
+/// The setting of some pictures, with a camera of each.
+class Stage {
+ public:
+  /// @param chosen number of the shot of each picture
+  Stage(const std::vector<Shot>& shots, const std::vector<std::size_t>& chosen,
+        const PictureRequest& request)
+      : shots_(shots), setting_(set_stage(shots, request)) {
+    if (!request.colour.empty()) {
+      setting_.colouring = colouring_of(shots, chosen, request, setting_.spacing);
+    }
+    if (request.orbit == 0) return;
+    cameras_ = orbit(setting_.camera, setting_.up, setting_.middle, some_points(shots),
+                     request.orbit, chosen.size());
+  }
+
+  /// Draws a shot. @param picture number of the picture among those chosen
+  Image draw(std::size_t shot, std::size_t picture) {
+    if (!cameras_.empty()) setting_.camera = cameras_[picture];
+    const bool fields = setting_.colouring.has_value();
+    const auto surface = read_if_any(shots_[shot].surface, fields),
+               phyxels = read_if_any(shots_[shot].phyxels, fields);
+    return draw_picture(surface ? &*surface : nullptr, phyxels ? &*phyxels : nullptr, setting_);
+  }
+
+ private:
+  const std::vector<Shot>& shots_;
+  Setting setting_;
+  std::vector<Camera> cameras_;  // of the pictures; empty if they share that of the setting
+};
+
 bool is_picture_name(const std::string& name) {
   if (name.rfind("frame_", 0) != 0 || !name.ends_with(".png") || name.size() < 16) return false;
   const std::string number = name.substr(6, name.size() - 10);
@@ -149,20 +199,27 @@ std::vector<fs::path> render(const fs::path& input, const fs::path& folder,
                                                 : input.stem().string() + ".png"));
     check_output_file(files.back(), overwrite, Output::file);
   }
-  Setting setting = set_stage(trajectory.shots, request);
-  if (!request.colour.empty()) {
-    setting.colouring = colouring_of(trajectory.shots, chosen, request, setting.spacing);
-  }
+  Stage stage(trajectory.shots, chosen, request);
   make_writable_folder(folder);
-  for (std::size_t k = 0; k < chosen.size(); ++k) {
-    const Shot& shot = trajectory.shots[chosen[k]];
-    const bool fields = setting.colouring.has_value();
-    const auto surface = read_if_any(shot.surface, fields),
-               phyxels = read_if_any(shot.phyxels, fields);
-    write_png(files[k],
-              draw_picture(surface ? &*surface : nullptr, phyxels ? &*phyxels : nullptr, setting));
-  }
+  for (std::size_t k = 0; k < chosen.size(); ++k) write_png(files[k], stage.draw(chosen[k], k));
   return files;
+}
+
+std::size_t render_video(const fs::path& input, const VideoRequest& video,
+                         const PictureRequest& request, bool overwrite) {
+  check_video(video, request.width, request.height, overwrite);
+  const Trajectory trajectory = find_trajectory(input, {request.surface, request.phyxels});
+  auto chosen = choose_frames(request.choice, trajectory.shots.size());
+  if (chosen.size() == 1 && request.orbit != 0) {
+    constexpr int seconds = 4;
+    chosen.resize(static_cast<std::size_t>(seconds * video.pictures_per_second), chosen[0]);
+  }
+  Stage stage(trajectory.shots, chosen, request);
+  if (video.file.has_parent_path()) make_writable_folder(video.file.parent_path());
+  Video film(video, request.width, request.height);
+  for (std::size_t k = 0; k < chosen.size(); ++k) film.add(stage.draw(chosen[k], k));
+  film.finish();
+  return chosen.size();
 }
 
 std::vector<fs::path> render_directory(const fs::path& out, const Scene& scene, bool overwrite) {

@@ -10,6 +10,7 @@
 #include "compose.hpp"
 #include "phyxel/scene.hpp"
 #include "trajectory.hpp"
+#include "video.hpp"
 
 namespace phyxel::app {
 
@@ -24,6 +25,7 @@ struct PictureRequest {
   std::optional<std::pair<double, double>> range = {};
   Scale scale =
       Scale::automatic;  ///< Of the colours; linear if it is automatic and `range` is set.
+  double orbit = 0;  ///< Angle by which the camera turns about `up` from first to last picture [°].
   /// Folder of the scene, from which it names meshes; empty: the current one.
   std::filesystem::path scene_folder = {};
 };
@@ -37,6 +39,13 @@ struct PictureRequest {
 std::vector<std::filesystem::path> render(const std::filesystem::path& input,
                                           const std::filesystem::path& folder,
                                           const PictureRequest& request, bool overwrite);
+
+/// Draws the frames of a run's folder, a series file or a frame file as `render` does, into a
+/// video. A single frame is drawn for four seconds if the camera turns.
+/// @returns the number of its pictures
+/// @throws InputError, also as `check_video` and `render`; OutputError if encoding or writing fails
+std::size_t render_video(const std::filesystem::path& input, const VideoRequest& video,
+                         const PictureRequest& request, bool overwrite);
 
 /// Draws some frames of a run's folder, as its scene asks, into `out`/pictures at the end of the
 /// run. With `overwrite`, pictures of an earlier run are removed.

@@ -1,18 +1,11 @@
 #include "plot.hpp"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <spawn.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <sstream>
 
+#include "child_process.hpp"
 #include "files/atomic_file.hpp"
 #include "outside_text.hpp"
 #include "phyxel/error.hpp"
@@ -46,60 +39,7 @@ std::string head(const std::string& title, const std::string& y_label) {
          "set linetype 5 lc rgb '#e69f00' lw 2 pt 11\nset linetype 6 lc rgb '#56b4e9' lw 2 pt 3\n";
 }
 
-fs::path gnuplot() {
-  const char* path = std::getenv("PATH");
-  std::istringstream folders(path ? path : "");
-  for (std::string folder; std::getline(folders, folder, ':');) {
-    const fs::path program = fs::path(folder) / "gnuplot";
-    if (access(program.c_str(), X_OK) == 0) return program;
-  }
-  return {};
-}
-
-/// A temporary folder that only this user can access.
-class PrivateFolder {
- public:
-  PrivateFolder() {
-    std::string name = (fs::temp_directory_path() / "phyxel_plot_XXXXXX").string();
-    if (!mkdtemp(name.data())) {
-      throw OutputError(fmt::format("{}: cannot be created: {}", name, std::strerror(errno)));
-    }
-    path_ = name;
-  }
-  ~PrivateFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  PrivateFolder(const PrivateFolder&) = delete;
-  PrivateFolder& operator=(const PrivateFolder&) = delete;
-  fs::path file(const char* name) const { return path_ / name; }
-
- private:
-  fs::path path_;
-};
-
-/// Runs gnuplot on a script, without a shell. @returns true on success
-bool plot(const fs::path& program, const fs::path& script, const fs::path& drawing,
-          const fs::path& words) {
-  posix_spawn_file_actions_t actions;
-  posix_spawn_file_actions_init(&actions);
-  constexpr int flags = O_WRONLY | O_CREAT | O_TRUNC;
-  posix_spawn_file_actions_addopen(&actions, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, drawing.c_str(), flags, 0600);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, words.c_str(), flags, 0600);
-  std::string name = program.string(), no_settings = "-d", argument = script.string();
-  char* const arguments[] = {name.data(), no_settings.data(), argument.data(), nullptr};
-  pid_t child = 0;
-  const int failed = posix_spawn(&child, program.c_str(), &actions, nullptr, arguments, environ);
-  posix_spawn_file_actions_destroy(&actions);
-  if (failed != 0) {
-    throw OutputError(fmt::format("{}: cannot be started: {}", name, std::strerror(failed)));
-  }
-  int status = 0;
-  while (waitpid(child, &status, 0) < 0 && errno == EINTR) {
-  }
-  return WIFEXITED(status) && WEXITSTATUS(status) == 0;
-}
+fs::path gnuplot() { return program_on_path("gnuplot"); }
 
 }  // namespace
 
@@ -172,7 +112,8 @@ void draw_svg(const std::string& script, const fs::path& file) {
                    "set terminal svg size 800,450 font 'sans,14' background rgb 'white'\n" + script,
                    Durable::no);
   constexpr std::size_t most_read = std::size_t{1} << 26;
-  if (!plot(program, source, drawing, words) || fs::file_size(drawing) == 0) {
+  Child child({program, {"-d", source.string()}, drawing, words});  // -d: without settings of users
+  if (!child.wait() || fs::file_size(drawing) == 0) {
     throw OutputError(
         fmt::format("{}: gnuplot failed: {}", file.string(), read_text_file(words, most_read)));
   }

@@ -1,8 +1,9 @@
-/// phyxel render: pictures of a trajectory.
+/// phyxel render: pictures and videos of a trajectory.
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
@@ -17,6 +18,7 @@ constexpr std::int64_t most_frames = 1'000'000'000;
 
 struct RenderOptions {
   std::filesystem::path input, out;
+  VideoRequest video;
   PictureRequest request;
   std::vector<double> view, up, range;
   std::string scale = "auto";
@@ -30,6 +32,18 @@ std::optional<Vec3d> vector_of(const std::vector<double>& values, const char* op
                                  values.size(), option));
   }
   return Vec3d{values[0], values[1], values[2]};
+}
+
+void video_command(const RenderOptions& options, const PictureRequest& request) {
+  const std::size_t pictures = render_video(options.input, options.video, request, options.force);
+  const std::string file = options.video.file.string();
+  const double seconds =
+      static_cast<double>(pictures) / static_cast<double>(options.video.pictures_per_second);
+  if (options.json) {
+    fmt::print("{}\n", json_text({{"video", file}, {"pictures", pictures}, {"seconds", seconds}}));
+    return;
+  }
+  fmt::print("{}: {} picture{}, {:.3g} s\n", file, pictures, pictures == 1 ? "" : "s", seconds);
 }
 
 void render_command(const RenderOptions& options) {
@@ -51,11 +65,15 @@ void render_command(const RenderOptions& options) {
                                    fmt::join(options.range, ",")));
     }
   }
+  if (!std::isfinite(request.orbit)) {
+    throw InputError(fmt::format("--orbit {}: allowed: a finite angle in degrees", request.orbit));
+  }
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
   if (!request.phyxels && !request.surface) {
     throw InputError("--no-phyxels --no-surface: nothing is left to draw; allowed: one of the two");
   }
+  if (!options.video.file.empty()) return video_command(options, request);
   std::filesystem::path folder = options.out;
   if (folder.empty()) {
     const bool directory = std::filesystem::is_directory(options.input);
@@ -74,18 +92,59 @@ void render_command(const RenderOptions& options) {
              files.size() > 1 ? files.back().string() : std::string());
 }
 
+void add_colour_options(CLI::App& command, RenderOptions& options) {
+  auto* colour = command.add_option(
+      "--colour,--color", options.request.colour,
+      "Field of the frames that colours show, with a bar: displacement, speed, von_mises, ...");
+  command
+      .add_option(
+          "--range", options.range,
+          "Range of the colours: low,high (default: that of 98% of the values of the pictures, "
+          "or of 94% on a logarithmic scale)")
+      ->delimiter(',')
+      ->allow_extra_args(false)
+      ->needs(colour);
+  command
+      .add_option("--scale", options.scale,
+                  "Scale of the colours: auto (logarithmic if most values crowd at the low end), "
+                  "linear or log")
+      ->check(CLI::IsMember({"auto", "linear", "log"}))
+      ->capture_default_str()
+      ->needs(colour);
+}
+
+/// @param out the option of the folder of pictures, which a video excludes
+void add_video_options(CLI::App& command, RenderOptions& options, CLI::Option* out) {
+  auto* video = command
+                    .add_option("--video", options.video.file,
+                                "Write a video instead, by ffmpeg: .mp4, .mov, .mkv, .webm or .gif")
+                    ->excludes(out);
+  command
+      .add_option("--fps", options.video.pictures_per_second,
+                  "Pictures per second of the video, whatever the interval of the frames")
+      ->check(CLI::Range(1, 240))
+      ->capture_default_str()
+      ->needs(video);
+  command
+      .add_option("--orbit", options.request.orbit,
+                  "Angle by which the camera turns about the vertical, from the first picture to "
+                  "the last [degrees]; a video of one frame then takes four seconds")
+      ->check(CLI::Range(-36000.0, 36000.0));
+}
+
 }  // namespace
 
 void add_render(CLI::App& program) {
   CLI::App* command = program.add_subcommand(
-      "render", "Draw PNG pictures of a trajectory: the shaded surface, phyxels as dots");
+      "render",
+      "Draw PNG pictures or a video of a trajectory: the shaded surface, phyxels as dots");
   auto options = std::make_shared<RenderOptions>();
   PictureRequest& request = options->request;
   command
       ->add_option("input", options->input, "Folder of a run, a .series file, or one frame (.hdf)")
       ->required();
-  command->add_option("--out", options->out,
-                      "Folder for the pictures (default: pictures/ beside the frames)");
+  auto* out = command->add_option("--out", options->out,
+                                  "Folder for the pictures (default: pictures/ beside the frames)");
   auto* frames = command
                      ->add_option("--frames", request.choice.frames,
                                   "Frames, comma separated, from 0; -1 is the last (default: all)")
@@ -111,24 +170,8 @@ void add_render(CLI::App& program) {
                    "Vertical direction of the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  auto* colour = command->add_option(
-      "--colour,--color", request.colour,
-      "Field of the frames that colours show, with a bar: displacement, speed, von_mises, ...");
-  command
-      ->add_option(
-          "--range", options->range,
-          "Range of the colours: low,high (default: that of 98% of the values of the pictures, "
-          "or of 94% on a logarithmic scale)")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->needs(colour);
-  command
-      ->add_option("--scale", options->scale,
-                   "Scale of the colours: auto (logarithmic if most values crowd at the low end), "
-                   "linear or log")
-      ->check(CLI::IsMember({"auto", "linear", "log"}))
-      ->capture_default_str()
-      ->needs(colour);
+  add_colour_options(*command, *options);
+  add_video_options(*command, *options, out);
   command->add_option("--scene-folder", request.scene_folder,
                       "Folder of the scene, with the meshes of its obstacles (default: the current "
                       "one)");
@@ -142,6 +185,7 @@ void add_render(CLI::App& program) {
       "  phyxel render out/dino --frames 0,10,-1 --view 0,1,0 --out pictures\n"
       "  phyxel render out/dino --colour speed --range 0,2\n"
       "  phyxel render out/dino --count 6 --colour von_mises --scale log\n"
+      "  phyxel render out/dino --video dino.mp4 --orbit 90\n"
       "  phyxel render out/dino/surface_000010.hdf");
   command->callback([options] { render_command(*options); });
 }
