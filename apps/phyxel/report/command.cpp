@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 struct ReportOptions {
   fs::path input, out;
-  double megabytes = 64;
+  double megabytes = 16;
   bool no_stress = false, force = false, json = false;
 };
 
@@ -71,8 +71,9 @@ void add_report(CLI::App& program) {
                       "The page (default: report.html in the folder, or beside the file)");
   command
       ->add_option("--max-megabytes", options->megabytes,
-                   "Largest size of the page [MB]; frames and then phyxels are omitted to stay "
-                   "below it")
+                   "Largest size of the page [MB]; surfels beyond what a hundred frames leave room "
+                   "for, frames "
+                   "and phyxels are omitted to stay below it")
       ->check(CLI::Range(1.0, 1e4))
       ->capture_default_str();
   command->add_flag(
@@ -85,7 +86,7 @@ void add_report(CLI::App& program) {
   command->footer(
       "Examples:\n"
       "  phyxel report out/dino -o dino.html\n"
-      "  phyxel report out/dino --max-megabytes 10 --force");
+      "  phyxel report out/dino --max-megabytes 64 --force");
   command->callback([options] { report_command(*options); });
 }
 

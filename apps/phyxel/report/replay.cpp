@@ -14,6 +14,7 @@
 #include "report/replay_obstacles.hpp"
 #include "report/report.hpp"
 #include "report/run_files.hpp"
+#include "report/thinning.hpp"
 #include "scene/upright.hpp"
 #include "trajectory.hpp"
 #include "version.hpp"
@@ -33,6 +34,14 @@ std::vector<T> each(const std::vector<T>& values, std::size_t stride) {
   std::vector<T> some;
   for (std::size_t k = 0; k < values.size(); k += stride) some.push_back(values[k]);
   return some;
+}
+
+/// The values at some places.
+template <class T>
+std::vector<T> some(const std::vector<T>& values, const std::vector<std::size_t>& places) {
+  std::vector<T> chosen;
+  for (const std::size_t k : places) chosen.push_back(values[k]);
+  return chosen;
 }
 
 /// A number with commas between thousands.
@@ -69,6 +78,13 @@ class Replay {
     report.fields = field_names_;
     for (const Obstacle& obstacle : obstacles_) report.obstacles.push_back(obstacle.name);
     report.notes = notes_;
+    if (thins()) {
+      report.notes.push_back(
+          fmt::format("The surface is drawn with {} of its {} surfels, for a page below {:g} MB "
+                      "(--max-megabytes).",
+                      with_separators(report.surfels),
+                      with_separators(first_surface_->point.size()), request_.megabytes));
+    }
     report.html = page(instances);
     return report;
   }
@@ -85,6 +101,11 @@ class Replay {
                                    frame.point.size(), first->point.size()));
     }
     return frame;
+  }
+
+  /// True if the page draws a part of the surfels.
+  bool thins() const {
+    return first_surface_ && shown_surface_.surfel.size() < first_surface_->point.size();
   }
 
   const FrameData& any() const { return first_phyxels_ ? *first_phyxels_ : *first_surface_; }
@@ -163,18 +184,36 @@ class Replay {
       field_names_.push_back(field.name);
       field_units_.push_back(field.unit);
     }
-    const std::size_t surfels = first_surface_ ? first_surface_->point.size() : 0;
-    const std::size_t phyxels = first_phyxels_ ? first_phyxels_->point.size() : 0;
-    const std::size_t triangles = first_surface_ ? first_surface_->triangle.size() : 0;
-    constexpr double as_text = 4.0 / 3;
     const std::size_t all = trajectory_.shots.size();
-    const double fields = static_cast<double>(field_names_.size());
-    const double once = static_cast<double>(12 * triangles + 5 * Carriers::each * surfels) +
-                        embedded_size(obstacles_);
-    const FramePlan plan =
-        plan_frames(all, as_text * static_cast<double>(surfels) * (6 + (phyxels ? 0 : 2 * fields)),
-                    as_text * static_cast<double>(phyxels) * (6 + 2 * fields),
-                    1e6 * request_.megabytes - as_text * once - 3e5);
+    const std::size_t phyxels = first_phyxels_ ? first_phyxels_->point.size() : 0;
+    constexpr double as_text = 4.0 / 3;
+    const auto fields = static_cast<double>(field_names_.size());
+    const double of_phyxel = as_text * (6 + 2 * fields),
+                 of_surfel = as_text * (6 + (phyxels ? 0 : 2 * fields));
+    const double bytes = 1e6 * request_.megabytes - as_text * embedded_size(obstacles_) - 3e5;
+    const double once_of_surfel = as_text * 5 * Carriers::each;
+    if (first_surface_) {
+      // Few enough surfels for a hundred frames beside the phyxels, which get half the page at
+      // most.
+      constexpr std::size_t frames = 100;
+      const auto shown = static_cast<double>(std::min(all, frames));
+      const double room =
+          bytes - std::min(bytes / 2, of_phyxel * shown * static_cast<double>(phyxels));
+      const auto count = static_cast<double>(first_surface_->point.size());
+      const double of_triangles = as_text * 12 *
+                                  static_cast<double>(first_surface_->triangle.size()) /
+                                  std::max(1.0, count);
+      const double once = once_of_surfel + of_triangles;
+      // No fewer than 20,000 for the sake of frames, if ten frames of these take half the room.
+      const double least = std::min(20'000.0, room / 2 / (once + 10 * of_surfel));
+      const double most = std::max(least, room / (once + of_surfel * shown));
+      shown_surface_ = thinned(*first_surface_, static_cast<std::size_t>(std::max(1.0, most)));
+    }
+    const auto surfels = static_cast<double>(shown_surface_.surfel.size());
+    const double once = as_text * 12 * static_cast<double>(shown_surface_.triangle.size()) +
+                        once_of_surfel * surfels;
+    const FramePlan plan = plan_frames(all, of_surfel * surfels,
+                                       of_phyxel * static_cast<double>(phyxels), bytes - once);
     stride_ = plan.phyxel_stride;
     FrameChoice choice;
     if (plan.frames < all) choice.count = static_cast<std::int64_t>(plan.frames);
@@ -232,7 +271,7 @@ class Replay {
       instance.time = trajectory_.shots[shot].time;
       const auto surface = read(trajectory_.shots[shot].surface, first_surface_);
       const auto phyxels = read(trajectory_.shots[shot].phyxels, first_phyxels_);
-      if (surface) instance.surfels = surface->point;
+      if (surface) instance.surfels = some(surface->point, shown_surface_.surfel);
       if (phyxels) instance.phyxels = each(phyxels->point, stride_);
       std::vector<Field> fields = fields_of(phyxels ? *phyxels : *surface);
       const bool same = std::equal(
@@ -245,7 +284,8 @@ class Replay {
                 .string()));
       }
       for (const Field& field : fields) {
-        instance.fields.push_back(each(field.values, phyxels ? stride_ : 1));
+        instance.fields.push_back(phyxels ? each(field.values, stride_)
+                                          : some(field.values, shown_surface_.surfel));
       }
     }
     return instances;
@@ -284,7 +324,7 @@ class Replay {
       embed(fmt::format("frame{}", k), quantised(instances[k], extent));
     }
     const Instance& start = instances.front();
-    if (!start.surfels.empty()) embed("triangles", first_surface_->triangle);
+    if (!start.surfels.empty()) embed("triangles", shown_surface_.triangle);
     if (!start.surfels.empty() && !start.phyxels.empty()) {
       const Carriers carriers =
           carriers_of(start.surfels, start.phyxels, spacing > 0 ? 1.6 * spacing : 1);
@@ -354,6 +394,10 @@ class Replay {
     }
     if (first_surface_) {
       line += with_separators(first_surface_->point.size()) + " surfels, ";
+      if (thins()) {
+        line.replace(line.size() - 2, 2,
+                     fmt::format(" ({} drawn), ", with_separators(shown_surface_.surfel.size())));
+      }
     }
     return line + fmt::format("{} frames to t = {:g} s", trajectory_.shots.size(), end);
   }
@@ -369,6 +413,7 @@ class Replay {
   std::vector<Obstacle> obstacles_;
   RigidPaths paths_;  // of those that are free bodies
   std::vector<std::size_t> chosen_;
+  ThinnedSurface shown_surface_;  // of the first frame; empty without a surface
   std::size_t stride_ = 1;
   std::vector<std::string> field_names_, field_units_, notes_;
 };

@@ -10,7 +10,7 @@ namespace phyxel::app {
 /// Settings of a page.
 struct ReplayRequest {
   std::filesystem::path input;  ///< A run's folder, a series or a frame.
-  double megabytes = 64;        ///< Largest size of the page [MB].
+  double megabytes = 16;        ///< Largest size of the page [MB].
   bool stress = true;           ///< True if strains and stresses that frames lack are computed.
 };
 
