@@ -32,4 +32,19 @@ DrawnObstacles drawn_obstacles(
   return drawn;
 }
 
+Obstacle floor_below(Vec3d up, Vec3d middle, double lowest, double extent) {
+  constexpr double gap = 0.05;  // over the extent
+  const Vec3d normal = normalised(up);
+  ObstacleRequest floor;
+  floor.name = "floor";
+  floor.shape = "plane";
+  floor.normal = normal;
+  floor.translation = middle + (lowest - gap * extent - dot(middle, normal)) * normal;
+  Scene scene;
+  scene.obstacles.push_back(floor);
+  return obstacles_of(scene).front();
+}
+
+bool looks_down(Vec3d view, Vec3d up) { return dot(normalised(view), normalised(up)) < -0.1; }
+
 }  // namespace phyxel::app

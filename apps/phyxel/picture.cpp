@@ -64,9 +64,13 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   setting.up = request.up.value_or(asked.up);
   // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
   CameraFit fit(request.width, request.height, request.view.value_or(asked.view), setting.up);
+  Span height;  // along `up`
   for (const Shot& shot : shots) {
     for (const fs::path& file : {shot.surface, shot.phyxels}) {
-      if (const auto frame = read_if_any(file)) fit.include(frame->point);
+      const auto frame = read_if_any(file);
+      if (!frame) continue;
+      fit.include(frame->point);
+      for (const Vec3d& p : frame->point) height.include(dot(p, normalised(setting.up)));
     }
   }
   for (const Obstacle& obstacle : setting.obstacles) {
@@ -79,6 +83,11 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   setting.camera = fit.camera();
   setting.extent = fit.extent();
   setting.middle = fit.middle();
+  if (request.floor && setting.obstacles.empty() &&
+      looks_down(setting.camera.forward, setting.up)) {
+    setting.obstacles.push_back(
+        floor_below(setting.up, setting.middle, height.low, setting.extent));
+  }
   for (Obstacle& obstacle : setting.obstacles) {
     const double spacing = std::max(0.5 * setting.spacing, setting.extent / 256);
     obstacle.set_field(spacing, 4 * spacing);

@@ -19,6 +19,8 @@ struct PictureRequest {
   /// Directions of the camera and of the picture's vertical; if unset, those of the frames' scene.
   std::optional<Vec3d> view, up;
   bool phyxels = true, surface = true;  ///< Families that are drawn, if they exist.
+  /// True for a floor below the bodies, if the scene has no obstacles and the camera looks down.
+  bool floor = true;
   FrameChoice choice;
   std::string colour;  ///< Name of a field of the frames that colours show; "": bodies differ.
   /// Range of the colours; unset: that of most values of the frames that are drawn.

@@ -177,6 +177,10 @@ void add_render(CLI::App& program) {
                       "one)");
   command->add_flag("--no-phyxels", options->no_phyxels, "Draw the surface only");
   command->add_flag("--no-surface", options->no_surface, "Draw the phyxels only, as spheres");
+  command->add_flag(
+      "--no-floor{false}", request.floor,
+      "Draw no floor, as is drawn below the bodies of a scene without obstacles if the "
+      "camera looks down");
   command->add_flag("--force", options->force, "Replace existing pictures");
   command->add_flag("--json", options->json, "The pictures' names as JSON, nothing else on stdout");
   command->footer(

@@ -171,6 +171,27 @@ TEST_F(ColouredPictures, ShowAFieldOfThePhyxelsOnTheSurface) {
   EXPECT_NE(coloured("1,3", "linear"), coloured("1,3", "log", "log"));
 }
 
+TEST_F(ColouredPictures, HaveAFloorWithShadowsIfTheCameraLooksDown) {
+  const auto drawn = [&](const char* view, bool floor) {
+    std::vector<std::string> words{"render",  "out",      "--frames", "1",     "--width",
+                                   "96",      "--height", "96",       "--out", "p",
+                                   "--force", "--view",   view};
+    if (!floor) words.emplace_back("--no-floor");
+    const Outcome done = run(words);
+    EXPECT_EQ(done.code, 0) << done.err;
+    return test::text_of(folder_ / "p" / "frame_000001.png");
+  };
+  EXPECT_NE(drawn("1,2,-0.6", true), drawn("1,2,-0.6", false));
+  EXPECT_EQ(drawn("1,2,0.6", true), drawn("1,2,0.6", false));
+  EXPECT_NE(drawn("0,0,-1", true), drawn("0,0,-1", false));
+  // A page has it, too, but not among the obstacles of its scene.
+  const Outcome page = run({"report", "out", "--json"});
+  ASSERT_EQ(page.code, 0) << page.err;
+  EXPECT_THAT(page.out, HasSubstr("\"obstacles\": []"));
+  const std::string html = test::text_of(folder_ / "out" / "report.html");
+  EXPECT_THAT(html, HasSubstr("\"only_floor\":true"));
+}
+
 TEST_F(ColouredPictures, WrongFieldsAndRangesAreRefused) {
   const auto refused = [&](const std::vector<std::string>& more, const char* why) {
     std::vector<std::string> words{"render", "out", "--out", "none"};

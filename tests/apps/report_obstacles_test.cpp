@@ -106,6 +106,22 @@ TEST_F(RigidPaths, PutFreeBodiesWhereTheyWereInTheNearestFrame) {
   EXPECT_NEAR(app::placed(obstacles, {}, 1)[0].distance({0, 0, 0.2}), 0, 1e-12);
 }
 
+/// Bodies of a scene without obstacles have a floor, which they never touch.
+TEST(Floors, LieBelowBodies) {
+  for (const Vec3d up : {Vec3d{0, 0, 1}, Vec3d{0, -2, 0}, Vec3d{1, 1, 1}}) {
+    const Vec3d middle{3, 4, 5}, unit = normalised(up);
+    const double lowest = dot(middle, unit) - 0.5;
+    const std::vector<Obstacle> floor{app::floor_below(up, middle, lowest, 1)};
+    const app::PlacedObstacle placed = app::placed(floor, {}, 0)[0];
+    EXPECT_FALSE(placed.bounded);
+    EXPECT_NEAR(placed.distance(middle), 0.5 + 0.05, 1e-12);
+    EXPECT_NEAR(placed.distance(middle + unit), 1.5 + 0.05, 1e-12);
+  }
+  EXPECT_TRUE(app::looks_down({0, 1, -0.6}, {0, 0, 1}));
+  EXPECT_FALSE(app::looks_down({0, 1, 0}, {0, 0, 1}));
+  EXPECT_FALSE(app::looks_down({0, 1, -0.6}, {0, 0, -1}));
+}
+
 class PagesWithObstacles : public test::Program {
  protected:
   /// Runs a block above one obstacle of each shape, of which the box moves by 1 m/s along x.

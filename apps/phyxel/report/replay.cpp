@@ -374,7 +374,10 @@ class Replay {
     }
     std::vector<double> times;
     for (const Instance& instance : instances) times.push_back(instance.time);
-    data["obstacles"] = obstacles_json(obstacles_, paths_, times, extent);
+    const bool floor = obstacles_.empty() && looks_down(pictures_.view, pictures_.up);
+    data["obstacles"] = obstacles_json(
+        floor ? std::vector{floor_of(instances, extent)} : obstacles_, paths_, times, extent);
+    data["only_floor"] = floor;
     data["spacing"] = spacing / radius;
     data["carriers"] = Carriers::each;
     const auto axes = upright_axes(pictures_.up);
@@ -385,6 +388,17 @@ class Replay {
     data["log"] = run_.log();
     data["timing"] = run_.timing();
     return data;
+  }
+
+  /// A floor below all points of a scene without obstacles.
+  Obstacle floor_of(const std::vector<Instance>& instances, const Extent& extent) const {
+    Span height;
+    for (const Instance& instance : instances) {
+      for (const auto* points : {&instance.surfels, &instance.phyxels}) {
+        for (const Vec3d& p : *points) height.include(dot(p, normalised(pictures_.up)));
+      }
+    }
+    return floor_below(pictures_.up, extent.centre(), height.low, 2 * extent.radius);
   }
 
   std::string summary_line(double end) const {

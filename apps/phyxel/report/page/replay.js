@@ -411,6 +411,7 @@ function control() {
     box.addEventListener('change', () => { shown[name] = box.checked; draw(); });
   }
   document.getElementById('with-obstacles').hidden = !obstacles.length;
+  if (data.only_floor) document.querySelector('#with-obstacles span').textContent = 'floor';
   document.getElementById('reset').addEventListener('click', () => { startView(); draw(); });
   const pointers = new Map();
   canvas.addEventListener('pointerdown', event => { canvas.setPointerCapture(event.pointerId); pointers.set(event.pointerId, event); });
@@ -471,9 +472,10 @@ if (data.timing.length) addTiming();
 else document.getElementById('timing-title').hidden = true;
 if (gl) prepare();
 else stage.append(element('p', {class: 'refusal'}, 'This browser has no WebGL 2, which the moving picture needs; the plots below do not.'));
-const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&play
+const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&play
 const colouring = data.fields.findIndex(f => f.name === asked.get('colours'));
 if (colouring >= 0) shown.field = colouring;
+if (asked.get('obstacles') === 'off') shown.obstacles = false;
 startView();
 control();
 show(asked.has('t') ? nearest(Number(asked.get('t'))) : data.opening.frame);
