@@ -297,6 +297,34 @@ TEST_F(Reports, OneFamilyAloneIsShown) {
   EXPECT_EQ(one["frames"].size(), 1u);
 }
 
+TEST_F(Reports, BodiesAreToldApart) {
+  run_beam();
+  EXPECT_THAT(page_of(), Not(HasSubstr("id=\"surfels-bodies\"")));  // a single one
+  std::string scene = text_of(folder_ / "beam.toml");
+  const std::string body = scene.substr(scene.find("[[body]]"));
+  write("beam.toml", scene + body + "\n[body.array]\ncount = [1, 2, 1]\nspacing = [0, 1, 0]\n");
+  ASSERT_EQ(run({"run", "beam.toml", "--force"}).code, 0);
+  const std::string page = page_of();
+  const json data = data_of(page);
+  for (const char* family : {"surfels", "phyxels"}) {
+    const auto bodies = embedded<std::uint16_t>(page, std::string(family) + "-bodies");
+    ASSERT_EQ(bodies.size(), data[family].get<std::size_t>());
+    for (const int k : {0, 1, 2}) {
+      EXPECT_EQ(std::count(bodies.begin(), bodies.end(), k), bodies.size() / 3);
+    }
+  }
+  PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
+  const std::string seen = seen_by_browser(folder_, "page.html#colours=bodies");
+  EXPECT_THAT(seen, HasSubstr("data-state=\"drawn\""));
+  EXPECT_THAT(seen, HasSubstr("data-error=\"0\""));
+  EXPECT_THAT(text_of(folder_ / "dom.html"), HasSubstr("<div class=\"legend\" hidden=\"\">"));
+  // What records a video is there.
+  EXPECT_THAT(text_of(folder_ / "dom.html"),
+              ::testing::ContainsRegex("<button id=\"video\"[^>]*>Save"));
+  EXPECT_THAT(text_of(folder_ / "dom.html"),
+              Not(::testing::ContainsRegex("<button id=\"video\"[^>]*hidden")));
+}
+
 TEST_F(Reports, WrongRequestsAreRefused) {
   run_beam();
   write("a.csv", "n\n1\n");

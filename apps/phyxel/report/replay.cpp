@@ -325,6 +325,16 @@ class Replay {
     }
     const Instance& start = instances.front();
     if (!start.surfels.empty()) embed("triangles", shown_surface_.triangle);
+    const auto embed_bodies = [&](const char* name, const std::vector<Index>& bodies) {
+      if (std::all_of(bodies.begin(), bodies.end(), [](Index body) { return body == 0; })) return;
+      embed(name, std::vector<std::uint16_t>(bodies.begin(), bodies.end()));
+    };
+    if (first_surface_ && first_surface_->body.size() == first_surface_->point.size()) {
+      embed_bodies("surfels-bodies", some(first_surface_->body, shown_surface_.surfel));
+    }
+    if (first_phyxels_ && first_phyxels_->body.size() == first_phyxels_->point.size()) {
+      embed_bodies("phyxels-bodies", each(first_phyxels_->body, stride_));
+    }
     if (!start.surfels.empty() && !start.phyxels.empty()) {
       const Carriers carriers =
           carriers_of(start.surfels, start.phyxels, spacing > 0 ? 1.6 * spacing : 1);

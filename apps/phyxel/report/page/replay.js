@@ -49,6 +49,12 @@ function fieldOf(frame, family, number) {
   return made;
 }
 
+/// The body of each point of a family.
+function bodiesOf(family) {
+  const id = `${family}-bodies`;
+  return document.getElementById(id) ? new Uint16Array(bytesOf(id)) : new Uint16Array(data[family]);
+}
+
 /// Of the surface, area-weighted; in bytes for the GPU.
 function normalsOf(points) {
   const n = new Float32Array(points.length), [sx, sy, sz] = data.scale;
@@ -65,27 +71,6 @@ function normalsOf(points) {
     out[o] = 127 * n[i] / size; out[o + 1] = 127 * n[i + 1] / size; out[o + 2] = 127 * n[i + 2] / size;
   }
   return out;
-}
-
-// --- colours -------------------------------------------------------------------------------------
-// Viridis, by a polynomial of degree six (Matt Zucker's fit, public domain).
-const ramp = `
-vec3 ramp(float t) {
-  t = clamp(t, 0.0, 1.0);
-  const vec3 c0 = vec3(0.2777273272234177, 0.005407344544966578, 0.3340998053353061);
-  const vec3 c1 = vec3(0.1050930431085774, 1.404613529898575, 1.384590162594685);
-  const vec3 c2 = vec3(-0.3308618287255563, 0.214847559468213, 0.09509516302823659);
-  const vec3 c3 = vec3(-4.634230498983486, -5.799100973351585, -19.33244095627987);
-  const vec3 c4 = vec3(6.228269936347081, 14.17993336680509, 56.69055260068105);
-  const vec3 c5 = vec3(4.776384997670288, -13.74514537774601, -65.35303263337234);
-  const vec3 c6 = vec3(-5.435455855934631, 4.645852612178535, 26.3124352495832);
-  return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * (c5 + t * c6)))));
-}`;
-function rampColour(t) {
-  const c = [[0.2777273, 0.1050930, -0.3308618, -4.6342305, 6.2282699, 4.7763850, -5.4354559],
-             [0.0054073, 1.4046135, 0.2148476, -5.7991010, 14.1799334, -13.7451454, 4.6458526],
-             [0.3340998, 1.3845902, 0.0950952, -19.3324410, 56.6905526, -65.3530326, 26.3124352]];
-  return c.map(k => Math.round(255 * Math.min(1, Math.max(0, k.reduceRight((sum, v) => sum * t + v, 0)))));
 }
 
 // --- drawing -------------------------------------------------------------------------------------
@@ -107,7 +92,7 @@ function compile(vertex, fragment) {
   gl.linkProgram(program);
   if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
   const at = {};
-  for (const name of ['scale', 'low', 'turn', 'pose', 'eye', 'lens', 'range', 'origin', 'plain', 'ball', 'parallel', 'towards', 'fade', 'ghost', 'pass', 'shade', 'depths',
+  for (const name of ['scale', 'low', 'turn', 'pose', 'eye', 'lens', 'range', 'origin', 'bodies', 'plain', 'ball', 'parallel', 'towards', 'fade', 'ghost', 'pass', 'shade', 'depths',
                       'lightRows', 'shaded']) at[name] = gl.getUniformLocation(program, name);
   return {program, at};
 }
@@ -129,11 +114,11 @@ function prepare() {
 in vec4 normal; out vec3 facing, upright;
 void main() { put(); upright = pose * normal.xyz; facing = turn * upright; }`;
   const surface = compile(placeOfSurface, ramp + shadows + `
-in float value; in vec3 seen, facing, around, upright; uniform vec3 plain, towards; out vec4 colour;
+in float value; in vec3 seen, facing, around, upright; uniform vec3 towards; out vec4 colour;
 void main() {
   vec3 n = normalize(facing), v = normalize(-seen), out_ = normalize(upright);
   if (dot(n, v) < 0.0) { n = -n; out_ = -out_; }
-  vec3 base = plain.x < 0.0 ? ramp(value) : plain;
+  vec3 base = baseColour(value);
   float open = lightAt(around, out_, 0.012);
   float light = 0.42 + 0.52 * open * max(0.0, dot(n, towards)) + 0.12 * max(0.0, dot(n, v)) + 0.14 * (1.0 - open) * (1.0 + dot(n, towards));
   float shine = 0.18 * open * pow(max(0.0, dot(reflect(-v, n), towards)), 24.0);
@@ -147,10 +132,10 @@ void main() { put(); gl_PointSize = clamp(ball / gl_Position.w, 2.0, 200.0); }`;
   float rest = 1.0 - dot(p, p);
   if (rest < 0.0) discard;`;
   const balls = compile(placeOfBall, ramp + `
-in float value; in vec3 seen; uniform vec3 plain, towards; out vec4 colour;
+in float value; in vec3 seen; uniform vec3 towards; out vec4 colour;
 void main() {${round}
   vec3 n = vec3(p.x, -p.y, sqrt(rest));
-  vec3 base = plain.x < 0.0 ? ramp(value) : plain;
+  vec3 base = baseColour(value);
   colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, towards))), 1.0);
 }`);
   programs = {surface, balls};
@@ -198,7 +183,7 @@ function upload(frame) {
     const f = frame[family];
     if (!f) continue;
     fill(buffers[family][0], f.points);
-    fill(buffers[family][1], shown.field < 0 ? new Uint16Array(f.points.length / 3) : fieldOf(frame, family, shown.field));
+    fill(buffers[family][1], shown.field < 0 ? bodiesOf(family) : fieldOf(frame, family, shown.field));
   }
   if (frame.surfels) fill(buffers.surfels[2], frame.surfels.normals ??= normalsOf(frame.surfels.points));
   uploaded = key;
@@ -218,37 +203,6 @@ function span(frame) {
     [low, high] = [least, most].map(v => field.low + v / 65535 * (field.high - field.low));
   }
   return log && high > 0 ? [Math.max(low, high / 1000), high, true] : [low, high, false];
-}
-
-/// The bar of colours, with pointed ends where values lie beyond it, and its ticks.
-function drawLegend(low, high, logarithmic) {
-  const legend = stage.querySelector('.legend'), field = data.fields[shown.field];
-  legend.hidden = !field;
-  if (!field) return;
-  legend.querySelector('.name').textContent = `${field.name}${field.unit ? ` [${field.unit}]` : ''}`;
-  const bar = legend.querySelector('canvas'), pen = bar.getContext('2d'), end = 12, width = bar.width - 2 * end, half = bar.height / 2;
-  pen.clearRect(0, 0, bar.width, bar.height);
-  for (let k = 0; k < width; ++k) {
-    pen.fillStyle = `rgb(${rampColour(k / (width - 1)).join()})`;
-    pen.fillRect(end + k, 0, 1, bar.height);
-  }
-  for (const [beyond, share, tip, base] of [[field.low < low, 0, 1, end], [field.high > high, 1, bar.width - 1, bar.width - end]]) {
-    if (!beyond) continue;
-    pen.fillStyle = `rgb(${rampColour(share).join()})`;
-    pen.beginPath(); pen.moveTo(base, 0); pen.lineTo(tip, half); pen.lineTo(base, bar.height); pen.fill();
-  }
-  let all = high > low ? ticks(low, high, 4) : [low];
-  if (logarithmic) {
-    for (const multiples of [[1], [1, 2, 5]]) {
-      all = [];
-      for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); ++power) all.push(...multiples.map(m => m * 10 ** power));
-      all = all.filter(v => v >= low && v <= high);
-      if (all.length > 1) break;
-    }
-  }
-  const share = v => high > low ? (logarithmic ? Math.log(v / low) / Math.log(high / low) : (v - low) / (high - low)) : 0;
-  const label = v => logarithmic && (v >= 1000 || v < 0.01) ? v.toExponential(0).replace('+', '') : short(+v.toPrecision(6));
-  legend.querySelector('.ticks').replaceChildren(...all.map(v => element('span', {style: `left: ${100 * (end + share(v) * width) / bar.width}%`}, label(v))));
 }
 
 function draw() {
@@ -277,6 +231,7 @@ function draw() {
     gl.uniformMatrix3fv(at.turn, false, seenFrom.turn);
     gl.uniform3fv(at.eye, seenFrom.eye);
     gl.uniform4fv(at.lens, seenFrom.lens.slice(0, 4));
+    gl.uniform1f(at.bodies, field ? 0 : 1);
     gl.uniform1f(at.origin, logarithmic ? field.low / spread : -1);
     gl.uniform1f(at.parallel, seenFrom.lens[4]);
     gl.uniform2f(at.range, field ? (low - field.low) / spread : 0, field ? (high - field.low) / spread : 1);
@@ -316,12 +271,10 @@ function draw() {
   if (surface) {
     const at = use(eye, programs.surface);
     bindShadows(at, scene);
-    gl.uniform3fv(at.plain, field ? [-1, 0, 0] : [0.36, 0.56, 0.76]);
     drawSurface();
   }
   if (balls) {
     const at = use(eye, programs.balls);
-    gl.uniform3fv(at.plain, field ? [-1, 0, 0] : [0.82, 0.42, 0.32]);
     drawBalls(at, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
   }
   if (scene) drawObstacles(frame.number, program => { const at = use(eye, program); bindShadows(at, true); return at; });
@@ -397,7 +350,7 @@ function control() {
   if (length > 0) speed.append(element('option', {value: whole}, 'in 10 s'));
   speed.value = length > 0 && (length < 1 || length > 30) ? whole : 1;
   const field = document.getElementById('field');
-  field.append(element('option', {value: -1}, 'nothing'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
+  field.append(element('option', {value: -1}, 'bodies'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
   field.value = shown.field;
   field.addEventListener('change', () => { choose(Number(field.value)); draw(); });
   const log = document.getElementById('log');
@@ -472,9 +425,10 @@ if (data.timing.length) addTiming();
 else document.getElementById('timing-title').hidden = true;
 if (gl) prepare();
 else stage.append(element('p', {class: 'refusal'}, 'This browser has no WebGL 2, which the moving picture needs; the plots below do not.'));
-const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&play
-const colouring = data.fields.findIndex(f => f.name === asked.get('colours'));
-if (colouring >= 0) shown.field = colouring;
+const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&play&video
+const colouring = asked.get('colours');
+if (colouring === 'bodies') shown.field = -1;
+else if (data.fields.some(f => f.name === colouring)) shown.field = data.fields.findIndex(f => f.name === colouring);
 if (asked.get('obstacles') === 'off') shown.obstacles = false;
 startView();
 control();
