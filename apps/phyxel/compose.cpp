@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "draw_obstacles.hpp"
 #include "label.hpp"
@@ -124,7 +125,39 @@ void add_obstacles(Rasteriser& rasteriser, const Bodies& bodies, const Setting& 
                  [&](Vec3d place, Index body) { return shadows.light_at(place, body); });
 }
 
+/// Draws a bar of a round length, as it is seen in the middle of the bodies, over the time label.
+void draw_scale_bar(Image& image, const Setting& setting) {
+  constexpr std::uint8_t ink = 64;
+  const double length = round_length(setting.camera, setting.middle);
+  if (!(length > 0)) return;
+  const double scale = text_scale(image);
+  const int margin = static_cast<int>(9 * scale), thick = std::max(1, static_cast<int>(scale));
+  const int width = static_cast<int>(length * setting.camera.focal /
+                                     setting.camera.project(setting.middle).depth);
+  const int cap = static_cast<int>(2 * scale), bottom = image.height - static_cast<int>(23 * scale);
+  if (bottom - 2 * cap < 0 || margin + width >= image.width) return;  // the picture has no room
+  const auto fill = [&](int x0, int x1, int y0, int y1) {
+    for (int y = y0; y < y1; ++y) std::fill_n(image.pixel(x0, y), 3 * (x1 - x0), ink);
+  };
+  fill(margin, margin + width, bottom - thick, bottom);
+  fill(margin, margin + thick, bottom - cap - thick, bottom);
+  fill(margin + width - thick, margin + width, bottom - cap - thick, bottom);
+  draw_text(image, margin + width + static_cast<int>(4 * scale),
+            bottom - static_cast<int>(6 * scale), scale, short_number(length) + " m");
+}
+
 }  // namespace
+
+double round_length(const Camera& camera, Vec3d place) {
+  const double depth = camera.project(place).depth;
+  const double longest = 0.2 * camera.width * depth / camera.focal;
+  if (!(depth > 0) || !std::isfinite(longest)) return 0;
+  const double unit = std::pow(10, std::floor(std::log10(longest)));
+  for (const double by : {5.0, 2.0}) {
+    if (by * unit <= longest) return by * unit;
+  }
+  return unit;
+}
 
 double typical_spacing(const std::vector<Vec3d>& point) {
   const std::size_t n = point.size();
@@ -170,6 +203,7 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
     draw_text(image, margin, image.height - margin - static_cast<int>(7 * scale), scale,
               fmt::format("t = {:.{}f} s", bodies.time(), setting.time_decimals));
   }
+  if (bodies.any() && setting.scale_bar) draw_scale_bar(image, setting);
   if (bodies.any() && setting.colouring) draw_colour_bar(image, *setting.colouring);
   return image;
 }

@@ -20,6 +20,7 @@ struct Setting {
   double extent = 0;                        ///< Extent of the visible points [m].
   int time_decimals = 2;                    ///< Decimals of the time label; negative for no label.
   Vec3d middle;                             ///< Of the visible points [m].
+  bool scale_bar = false;                   ///< True for a bar of a round length at `middle`.
   std::vector<Obstacle> obstacles = {};     ///< Drawn where they are at the time of a frame.
   RigidPaths paths = {};                    ///< Of those that are free bodies.
   std::optional<Colouring> colouring = {};  ///< Unset: bodies have colours of their own.
@@ -28,6 +29,10 @@ struct Setting {
 /// Median distance to the nearest point [m], of a few points distributed over the list; 0 for fewer
 /// than two points.
 double typical_spacing(const std::vector<Vec3d>& point);
+
+/// The longest round length, 1, 2 or 5 times a power of ten, that takes at most a fifth of a
+/// picture's width at a place [m]; 0 if the place is behind the camera.
+double round_length(const Camera& camera, Vec3d place);
 
 /// Draws a frame. @param surface,phyxels frames of the same time; null if not drawn
 Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Setting& setting);

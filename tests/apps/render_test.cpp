@@ -68,6 +68,36 @@ TEST(Picture, ShowsPhyxelsAsDotsOnTheSurfaceAndTheTimeBelow) {
   }
 }
 
+TEST(Picture, HasABarOfARoundLength) {
+  const FrameData ball = sphere({1, 2, 3}, 0.01, 30);
+  Setting setting = setting_for(ball, 0.001);
+  setting.middle = {1, 2, 3};
+  const double length = round_length(setting.camera, setting.middle);
+  // The ball, 20 mm wide, takes 0.86 of 120 of 160 px: a fifth of the picture's width is 6 mm.
+  EXPECT_NEAR(length, 0.005, 1e-12);
+  const Image without = draw_picture(&ball, nullptr, setting);
+  setting.scale_bar = true;
+  const Image with = draw_picture(&ball, nullptr, setting);
+  int longest = 0;
+  for (int y = 60; y < 120; ++y) {
+    int dark = 0;
+    for (int x = 0; x < 160; ++x) dark += with.pixel(x, y)[0] == 64 && without.pixel(x, y)[0] > 64;
+    longest = std::max(longest, dark);
+  }
+  const Camera& camera = setting.camera;
+  const Vec3d end = setting.middle + length * camera.right;
+  EXPECT_NEAR(longest, camera.project(end).x - camera.project(setting.middle).x, 1);
+  EXPECT_EQ(round_length(camera, camera.eye - camera.forward), 0);
+  for (int k = 0; k < 60; ++k) {  // every size
+    setting.camera.focal *= 1.1;
+    const double other = round_length(setting.camera, setting.middle);
+    const double share =
+        other * setting.camera.focal / setting.camera.project(setting.middle).depth / 160;
+    EXPECT_GE(share, 0.08 - 1e-9);
+    EXPECT_LE(share, 0.2 + 1e-9);
+  }
+}
+
 /// A frame with a valid digest may have any normals; its picture is drawn.
 TEST(Picture, NormalsAndSpacingsThatAreNotFiniteAreDrawn) {
   FrameData ball = sphere({0, 0, 0}, 1, 16), dots;
