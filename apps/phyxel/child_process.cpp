@@ -52,7 +52,7 @@ fs::path program_on_path(const char* name) {
   const char* path = std::getenv("PATH");
   std::istringstream folders(path ? path : "");
   for (std::string folder; std::getline(folders, folder, ':');) {
-    const fs::path program = fs::path(folder) / name;
+    fs::path program = fs::path(folder) / name;
     if (access(program.c_str(), X_OK) == 0 && fs::is_regular_file(program)) return program;
   }
   return {};

@@ -96,7 +96,7 @@ std::vector<double> ticks_of(const ColourRange& range, int most) {
 }
 
 std::string short_number(double value) {
-  const std::string text = fmt::format("{:.3g}", value == 0 ? 0.0 : value);  // no -0
+  std::string text = fmt::format("{:.3g}", value == 0 ? 0.0 : value);  // no -0
   const std::size_t e = text.find('e');
   if (e == std::string::npos) return text;
   return fmt::format("{}e{}", text.substr(0, e), std::stoi(text.substr(e + 1)));

@@ -22,7 +22,7 @@ struct RenderOptions {
   PictureRequest request;
   std::vector<double> view, up, range;
   std::string scale = "auto";
-  bool no_phyxels = false, no_surface = false, force = false, json = false;
+  bool no_phyxels = false, no_surface = false, no_floor = false, force = false, json = false;
 };
 
 std::optional<Vec3d> vector_of(const std::vector<double>& values, const char* option) {
@@ -70,6 +70,7 @@ void render_command(const RenderOptions& options) {
   }
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
+  request.floor = !options.no_floor;
   if (!request.phyxels && !request.surface) {
     throw InputError("--no-phyxels --no-surface: nothing is left to draw; allowed: one of the two");
   }
@@ -178,7 +179,7 @@ void add_render(CLI::App& program) {
   command->add_flag("--no-phyxels", options->no_phyxels, "Draw the surface only");
   command->add_flag("--no-surface", options->no_surface, "Draw the phyxels only, as spheres");
   command->add_flag(
-      "--no-floor{false}", request.floor,
+      "--no-floor", options->no_floor,
       "Draw no floor, as is drawn below the bodies of a scene without obstacles if the "
       "camera looks down");
   command->add_flag("--force", options->force, "Replace existing pictures");

@@ -17,6 +17,7 @@ import time
 PROGRAM, SOURCE, WORK = (pathlib.Path(p).resolve() for p in sys.argv[1:4])
 STUDIES = PROGRAM.with_name("phyxel_studies")  # the developers' program, beside the users'
 MPIRUN = len(sys.argv) > 4
+FFMPEG = shutil.which("ffmpeg") is not None
 failures = []
 
 # What takes minutes, wants a GPU, or needs what only a finished measurement leaves.
@@ -173,6 +174,8 @@ def pages():
             wrong = options_are_known(command)
             if wrong:
                 fail(where, command, wrong)
+            elif "--video" in command and not FFMPEG:
+                print(f"SKIPPED, as there is no ffmpeg: {command}", flush=True)
             elif is_whole and not LONG.search(command) and (MPIRUN or not command.startswith("mpirun")):
                 start = time.monotonic()
                 done = run_alone(command, staged)
