@@ -146,6 +146,12 @@ void draw_scale_bar(Image& image, const Setting& setting) {
             bottom - static_cast<int>(6 * scale), scale, short_number(length) + " m");
 }
 
+/// True if dots of phyxels would be so near to each other that they hide the surface.
+bool crowds_dots(const Setting& setting) {
+  const double depth = setting.camera.project(setting.middle).depth;
+  return depth > 0 && setting.spacing * setting.camera.focal / depth < setting.nearest_dots;
+}
+
 }  // namespace
 
 double round_length(const Camera& camera, Vec3d place) {
@@ -188,7 +194,7 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
     if (!setting.obstacles.empty()) add_obstacles(rasteriser, bodies, setting);
     rasteriser.shade_hollows(surface != nullptr ? 0.05 * setting.extent : 1.5 * setting.spacing);
   }
-  if (surface != nullptr && phyxels != nullptr && !setting.colouring) {
+  if (surface != nullptr && phyxels != nullptr && !setting.colouring && !crowds_dots(setting)) {
     DotStyle style;
     style.largest = 0.04 * std::min(setting.camera.width, setting.camera.height);
     style.radius = 0.20 * setting.spacing;

@@ -16,11 +16,13 @@ namespace phyxel::app {
 struct Setting {
   Camera camera;
   Vec3d up{0, 0, 1};
-  double spacing = 0;                       ///< Typical distance between phyxels [m].
-  double extent = 0;                        ///< Extent of the visible points [m].
-  int time_decimals = 2;                    ///< Decimals of the time label; negative for no label.
-  Vec3d middle;                             ///< Of the visible points [m].
-  bool scale_bar = false;                   ///< True for a bar of a round length at `middle`.
+  double spacing = 0;      ///< Typical distance between phyxels [m].
+  double extent = 0;       ///< Extent of the visible points [m].
+  int time_decimals = 2;   ///< Decimals of the time label; negative for no label.
+  Vec3d middle;            ///< Of the visible points [m].
+  bool scale_bar = false;  ///< True for a bar of a round length at `middle`.
+  double nearest_dots =
+      0;  ///< Distance of phyxels below which no dots are drawn on a surface [px].
   std::vector<Obstacle> obstacles = {};     ///< Drawn where they are at the time of a frame.
   RigidPaths paths = {};                    ///< Of those that are free bodies.
   std::optional<Colouring> colouring = {};  ///< Unset: bodies have colours of their own.
@@ -34,7 +36,8 @@ double typical_spacing(const std::vector<Vec3d>& point);
 /// picture's width at a place [m]; 0 if the place is behind the camera.
 double round_length(const Camera& camera, Vec3d place);
 
-/// Draws a frame. @param surface,phyxels frames of the same time; null if not drawn
+/// Draws a frame, without dots of phyxels if these are too near to each other or colours show a
+/// field. @param surface,phyxels frames of the same time; null if not drawn
 Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Setting& setting);
 
 }  // namespace phyxel::app

@@ -84,6 +84,7 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   setting.extent = fit.extent();
   setting.middle = fit.middle();
   setting.scale_bar = true;
+  setting.nearest_dots = 8;
   if (request.floor && setting.obstacles.empty() &&
       looks_down(setting.camera.forward, setting.up)) {
     setting.obstacles.push_back(

@@ -176,7 +176,10 @@ void add_render(CLI::App& program) {
   command->add_option("--scene-folder", request.scene_folder,
                       "Folder of the scene, with the meshes of its obstacles (default: the current "
                       "one)");
-  command->add_flag("--no-phyxels", options->no_phyxels, "Draw the surface only");
+  command->add_flag(
+      "--no-phyxels", options->no_phyxels,
+      "Draw the surface only, without dots of phyxels, which are drawn where they are 8 px "
+      "apart at least");
   command->add_flag("--no-surface", options->no_surface, "Draw the phyxels only, as spheres");
   command->add_flag(
       "--no-floor", options->no_floor,

@@ -68,6 +68,22 @@ TEST(Picture, ShowsPhyxelsAsDotsOnTheSurfaceAndTheTimeBelow) {
   }
 }
 
+TEST(Picture, LeavesOutDotsThatWouldHideTheSurface) {
+  const FrameData surface = sphere({0, 0, 0}, 1, 30);
+  FrameData phyxels;
+  phyxels.point = {{0, 0, 0}, {0.5, -0.5, 0}};
+  // The sphere's 1 m is about 50 px.
+  const auto dots = [&](double spacing, double nearest) {
+    Setting setting = setting_for(surface, spacing);
+    setting.nearest_dots = nearest;
+    return pixels_that_differ(draw_picture(&surface, &phyxels, setting),
+                              draw_picture(&surface, nullptr, setting));
+  };
+  EXPECT_GT(dots(0.25, 8), 0);
+  EXPECT_EQ(dots(0.1, 8), 0);
+  EXPECT_GT(dots(0.1, 0), 0);
+}
+
 TEST(Picture, HasABarOfARoundLength) {
   const FrameData ball = sphere({1, 2, 3}, 0.01, 30);
   Setting setting = setting_for(ball, 0.001);
