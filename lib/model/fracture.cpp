@@ -195,6 +195,14 @@ void check_fracture(const BodyRequest& request) {
                       "0, as critical stretches follow from young and poisson");
     }
   };
+  const NeighbourhoodRule& rule = request.neighbourhood;
+  const double lowest = supports.front() / distance_to_ten,
+               most = supports.back() / distance_to_ten;
+  if (request.fracture && !rule.radius && (rule.factor < lowest || rule.factor > most)) {
+    refuse_key("body.neighbours.factor", fmt::format("{:g}", rule.factor),
+               fmt::format("{:.3g} to {:.3g}, for which critical stretches are known", lowest, most)
+                   .c_str());
+  }
   check_material("body.material", request.material);
   for (const InclusionRequest& inclusion : request.inclusions) {
     check_material("body.inclusion", inclusion.material);
@@ -214,10 +222,54 @@ void check_fracture(const BodyRequest& request) {
   }
 }
 
+namespace {
+
+/// True if a phyxel lies in a region, or on its faces.
+bool holds(const SpaceRegion& region, const Model& model, Index i) {
+  constexpr double digits = 1e-9;  // of positions, which faces share with boxes
+  const Vec3d x = model.position[i];
+  return region.distance(x) <= digits * (norm(x) + model.neighbourhood.support[i]);
+}
+
+/// The distance of the farthest neighbour of a phyxel [m].
+double reach_of(const Model& model, Index i) {
+  double square = 0;
+  for (const Index j : model.neighbourhood.neighbours.row(i)) {
+    const Vec3d x = model.position[j] - model.position[i];
+    square = std::max(square, dot(x, x));
+  }
+  return (1 + 1e-9) * std::sqrt(square);  // with the rounding of what lies at the end of a way
+}
+
+/// What a message says of a notch.
+std::string described(const NotchRequest& notch) {
+  if (!notch.mesh.empty()) return fmt::format("mesh = \"{}\"", notch.mesh.string());
+  const Vec3d c = notch.centre, n = notch.normal;
+  return fmt::format("centre = [{:g}, {:g}, {:g}], normal = [{:g}, {:g}, {:g}], radius = {:g}", c.x,
+                     c.y, c.z, n.x, n.y, n.z, notch.radius);
+}
+
+/// Refuses a body on all ranks, which have come to the same verdict.
+[[noreturn]] void refuse_on_all(const Model& model, const std::string& where,
+                                const BodyRequest& body, const std::string& problem) {
+  if (!model.share) refuse(where, body, problem);
+  throw AgreedError(
+      ExitCode::bad_input,
+      fmt::format("{}{}body \"{}\": {}", where, where.empty() ? "" : ": ", body.name, problem));
+}
+
+}  // namespace
+
 void find_fracture(Model& model, const Scene& scene) {
   for (const BodyRequest& body : scene.bodies) model.fracture.notched |= !body.notches.empty();
   for (const BodyRequest& body : scene.bodies) model.fracture.breaks |= body.fracture.has_value();
   if (!model.fracture.breaks) return;
+  for (const BodyRequest& body : scene.bodies) {
+    if (!body.fracture || !scene.contact) continue;
+    refuse(body.fracture->where, body,
+           "body.fracture found with [contact], for which the surface of a body would have to "
+           "break, too; allowed: one of both, and obstacles");
+  }
   model.fracture.growth.assign(static_cast<std::size_t>(model.size()), unbreakable_growth);
   for (const Part& part : model.parts) {
     const BodyRequest& request = scene.bodies[static_cast<std::size_t>(part.body)];
@@ -236,12 +288,8 @@ void find_fracture(Model& model, const Scene& scene) {
         stretch = stretch_of(request, part, spacings.of(of_support), spacings.relative_support,
                              i == part.begin ? model.warnings : again);
       }
-      const Vec3d x = model.position[i];
-      const auto holds = [&](const SpaceRegion& region) {
-        constexpr double digits = 1e-9;  // of positions, which faces share with boxes
-        return region.distance(x) <= digits * (norm(x) + of_support);
-      };
-      if (std::any_of(kept.begin(), kept.end(), holds)) continue;
+      const auto keeps = [&](const SpaceRegion& region) { return holds(region, model, i); };
+      if (std::any_of(kept.begin(), kept.end(), keeps)) continue;
       const double factor =
           fracture.scatter ? scatter_of(model.global_id(i), *fracture.scatter, fracture.seed) : 1;
       model.fracture.growth[i] = critical_growth(factor * stretch);
@@ -249,19 +297,25 @@ void find_fracture(Model& model, const Scene& scene) {
   }
 }
 
-namespace {
-
-/// The distance of the farthest neighbour of a phyxel [m].
-double reach_of(const Model& model, Index i) {
-  double square = 0;
-  for (const Index j : model.neighbourhood.neighbours.row(i)) {
-    const Vec3d x = model.position[j] - model.position[i];
-    square = std::max(square, dot(x, x));
+void check_unbreakable(const Model& model, const Scene& scene) {
+  for (std::size_t b = 0; b < scene.bodies.size(); ++b) {
+    const BodyRequest& body = scene.bodies[b];
+    if (!body.fracture) continue;
+    for (const Selection& selection : body.fracture->unbreakable) {
+      const SpaceRegion region = *region_of(selection);
+      bool any = false;
+      for (const Part& part : model.parts) {
+        if (part.body != static_cast<Index>(b)) continue;
+        for (Index i = part.begin; i < part.owned_end() && !any; ++i) any = holds(region, model, i);
+      }
+      if (model.share) any = model.share->communicator->largest(any ? 1.0 : 0.0) > 0;
+      if (any) continue;
+      refuse_on_all(model, selection.where, body,
+                    "body.fracture.unbreakable holds no phyxel of the body; allowed: a region with "
+                    "phyxels, once the body is in place");
+    }
   }
-  return (1 + 1e-9) * std::sqrt(square);  // with the rounding of what lies at the end of a way
 }
-
-}  // namespace
 
 std::vector<PhyxelPair> notched_pairs(const Model& model, const Scene& scene) {
   std::vector<PhyxelPair> pairs;
@@ -289,12 +343,11 @@ std::vector<PhyxelPair> notched_pairs(const Model& model, const Scene& scene) {
       }
       if (model.share) cut = model.share->communicator->largest(static_cast<double>(cut)) > 0;
       if (cut > 0) continue;
-      const std::string why = fmt::format(
-          "{}{}body \"{}\": body.notch {} cuts no pair of phyxels; allowed: a disc or "
-          "surface that cuts the body, once it is in place",
-          request.where, request.where.empty() ? "" : ": ", scene.bodies[b].name, k + 1);
-      if (model.share) throw AgreedError(ExitCode::bad_input, why);
-      throw InputError(why);
+      refuse_on_all(model, request.where, scene.bodies[b],
+                    fmt::format("body.notch {} ({}) cuts no pair of phyxels; allowed: a disc or "
+                                "surface between phyxels of the body, once it is in place; a "
+                                "phyxel in its plane lies above it, where the normal points",
+                                k + 1, described(request)));
     }
   }
   std::sort(pairs.begin(), pairs.end());

@@ -45,6 +45,10 @@ void check_fracture(const BodyRequest& request);
 /// @throws InputError for a strength that the distance between phyxels cannot represent
 void find_fracture(Model& model, const Scene& scene);
 
+/// Checks that each region whose phyxels do not break holds some. Of a share: collective.
+/// @throws InputError for one that does not
+void check_unbreakable(const Model& model, const Scene& scene);
+
 /// The pairs whose connection at rest crosses a notch of their body, as of `State::broken`.
 /// @throws InputError for a notch that cuts no pair. Of a share: collective
 std::vector<PhyxelPair> notched_pairs(const Model& model, const Scene& scene);

@@ -13,7 +13,9 @@ namespace phyxel {
 
 Notch::Notch(const NotchRequest& request, const BodyRequest& body) : disc_(request) {
   if (request.mesh.empty()) {
-    normal_ = normalised(request.normal);
+    // Its square may be too small for a number.
+    const Vec3d n = request.normal;
+    normal_ = normalised((1 / std::max({std::abs(n.x), std::abs(n.y), std::abs(n.z)})) * n);
     return;
   }
   Surface surface = read_mesh(request.mesh);

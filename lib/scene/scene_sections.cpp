@@ -49,6 +49,7 @@ std::vector<SceneSection> boundary_sections() {
        "Brittle fracture: two neighbours of the body above break apart for good where their distance grows beyond a critical share, which follows "
        "from `energy_release_rate`, the stiffness and the distance between phyxels. Needs an elastic law with `young` and `poisson` from 0 to "
        "0.35, hourglass control of 0.05 to 0.2, symmetric lists, and `neighbours.factor` of 1.55 to 1.88; without viscosity and volume stiffness. "
+       "It may touch obstacles; with `[contact]` of bodies it is refused, since its surface does not break. "
        "Where materials meet, the weaker phyxel of a pair decides. The energy that breaking takes is a column of `energy.csv`. Faces of cracks do not pass through each other, and do not rub."},
       {"body.fracture.unbreakable", "[[body.fracture.unbreakable]]", "selection",
        "A `box` or a `ball` whose phyxels break from no other."},

@@ -34,6 +34,7 @@ State initial_state(const Model& model, const Scene& scene, double dt) {
   state.dt = dt;
   state.displacement.resize(static_cast<std::size_t>(model.size()));
   state.velocity.resize(state.displacement.size());
+  check_unbreakable(model, scene);
   state.broken = notched_pairs(model, scene);
   // Prescribed phyxels have not moved yet.
   if (scene.solver.method == Method::equilibrium) return state;

@@ -363,9 +363,12 @@ TEST_F(FractureFiles, NotchesAndUnbreakableRegionsActWhereTheyAre) {
   body.fracture = FractureRequest{.energy_release_rate = 5};
   body.fracture->unbreakable.push_back({.box = Selection::Box{{-1, -1, -1}, {0.1, 1, 1}}});
   const Model kept = model_of(scene, lattice(8, 8, 4, 0.05));
+  EXPECT_NO_THROW(check_unbreakable(kept, scene));
   for (Index i = 0; i < kept.size(); ++i) {
     EXPECT_EQ(kept.fracture.growth[i] < 0, kept.position[i].x < 0.1);
   }
+  body.fracture->unbreakable[0].box = Selection::Box{{2, 2, 2}, {3, 3, 3}};
+  EXPECT_THROW(check_unbreakable(kept, scene), InputError);
 }
 
 /// The distribution of the critical stretches of pairs, of which the weaker phyxel decides: the
@@ -428,7 +431,7 @@ TEST(Fracture, IsRefusedWhereItCannotBe) {
               HasSubstr("energy_release_rate"));
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.poisson = 0.45; }), HasSubstr("0 to 0.35"));
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.neighbourhood.factor = 3; }),
-              HasSubstr("1.8 to 2.2"));
+              HasSubstr("body.neighbours.factor = 3; allowed: 1.54 to 1.89"));
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.hourglass = 0; }),
               HasSubstr("body.material.hourglass = 0"));
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.viscosity = 1e-3; }),
@@ -447,6 +450,8 @@ TEST(Fracture, IsRefusedWhereItCannotBe) {
               HasSubstr("law = \"j2\""));
   EXPECT_THAT(refusal([](Scene& s, Body&) { s.solver.method = Method::equilibrium; }),
               HasSubstr("equilibrium"));
+  EXPECT_THAT(refusal([](Scene& s, Body&) { s.contact = ContactRequest{}; }),
+              HasSubstr("[contact]"));
   // s_c E' is 1.5e4 Pa here, and that of phyxels 225 times as far apart 1e3 Pa.
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.fracture->strength = 1e3; }),
               HasSubstr("m apart cannot resolve"));
