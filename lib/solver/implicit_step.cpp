@@ -129,7 +129,6 @@ void ImplicitStep::take(State& state) {
     take_both_stages(state);
   } catch (...) {
     state = before;
-    backend_.put(before);  // whose history may be that of the step's start by now
     support_work_ = sums;
     throw;
   }
@@ -151,8 +150,6 @@ void ImplicitStep::take_both_stages(State& state) {
     if (rubs) balance_.slip = slip_of_stage(s, u, v);
     first_force = newton_.acting_forces(balance_, u);
   }
-  // The step before has left the history of its start, by which viscous stresses are known.
-  if (state.history_interval > 0) backend_.commit_history();
   backend_.set_history_interval(s);
   take_stage(begin + s, s, u, v, u2, v2);
   const Vector path = path_velocities(state.step, dt);
@@ -180,7 +177,7 @@ void ImplicitStep::take_both_stages(State& state) {
   add_contact(u2, v2, 1, end_contact_);
   vectors.refresh_ghosts(u2);
   backend_.put_displacements(u2);
-  if (model_.fracture.breaks) backend_.commit_history();
+  backend_.commit_history();
   State history;
   backend_.download(history);
   state.history = std::move(history.history);

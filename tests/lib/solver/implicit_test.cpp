@@ -7,7 +7,6 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/point_fields.hpp"
 #include "phyxel/solver.hpp"
 #include "support/backend.hpp"
 #include "support/clouds.hpp"
@@ -254,35 +253,6 @@ TEST(Implicit, AStoppedStepLeavesTheLastWholeOne) {
     EXPECT_TRUE(solver.state().displacement == end.displacement) << share;
     EXPECT_TRUE(solver.state().velocity == end.velocity) << share;
   }
-}
-
-/// Stresses of fields are those by which phyxels move, the viscous ones included: a bar whose end
-/// moves steadily has the stress of Verlet's steps, of which viscosity has a third. The two methods
-/// differ by the swings that a sudden start leaves, of some percent.
-TEST(Implicit, FieldsHaveTheViscousStress) {
-  Scene scene = clamped_bar();
-  scene.bodies[0].material.viscosity = 0.1;  // [s]
-  scene.bodies[0].motions.push_back(
-      {.select = {.box = Selection::Box{{-1, -1, 1.1}, {1, 1, 2}}}, .velocity = {0, 0, 0.05}});
-  const Model model = bar_of(scene);
-  constexpr double end = 0.2;
-  const double verlet_step = 0.8 * step_limit(model).largest_step;
-  const auto stress_after = [&](Method method, int steps, double interval = -1) {
-    const auto backend = make_test_backend(model, Precision::double_);
-    Scene by = scene;
-    by.solver.method = method;
-    Solver solver(model, *backend, initial_state(model, by, end / steps), method);
-    solver.step(steps);
-    if (interval >= 0) backend->set_history_interval(interval);
-    const Quantity wanted[] = {Quantity::stress};
-    const std::vector<double> all = find_fields(model, *backend, wanted).at(Quantity::stress);
-    double sum = 0;
-    for (std::size_t i = 0; i < all.size(); i += 6) sum += all[i + 2];
-    return sum / static_cast<double>(model.size());
-  };
-  const double expected = stress_after(Method::verlet, static_cast<int>(end / verlet_step) + 1);
-  EXPECT_NEAR(stress_after(Method::implicit, 40), expected, 0.02 * expected);
-  EXPECT_LT(stress_after(Method::implicit, 40, 0), 0.8 * expected);  // none without a time
 }
 
 /// Terms so stiff that steps could not be counted are refused by their key.
