@@ -225,7 +225,10 @@ class Replay {
                       chosen_.size(), all, request_.megabytes));
     }
     if (phyxels > 0 && stride_ != 1) {
-      notes_.push_back(fmt::format("One phyxel in {} is shown, for the same reason.", stride_));
+      notes_.push_back(fmt::format(
+          "One phyxel in {} is shown: with all phyxels the page would be larger than {:g} MB "
+          "(--max-megabytes).",
+          stride_, request_.megabytes));
     }
   }
 
