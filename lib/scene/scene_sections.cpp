@@ -52,7 +52,7 @@ std::vector<SceneSection> boundary_sections() {
        "It may touch obstacles; with `[contact]` of bodies it is refused, since its surface does not break. "
        "Where materials meet, the weaker phyxel of a pair decides. The energy that breaking takes is a column of `energy.csv`. Faces of cracks do not pass through each other, and do not rub."},
       {"body.fracture.unbreakable", "[[body.fracture.unbreakable]]", "selection",
-       "A `box` or a `ball` whose phyxels break from no other."},
+       "A `box` or a `ball` whose phyxels never break from their neighbours."},
       {"body.notch", "[[body.notch]]", "",
        "A disc, or a surface from a file, along which the body above is cut before it moves: phyxels on different sides, whose connection crosses it, "
        "are no neighbours. A phyxel in its plane counts as above it. Faces of notches do not pass through each other, and do not rub."},

@@ -18,7 +18,7 @@
 
 namespace phyxel {
 
-/// What a phyxel's stress depends on beside displacements, once pairs have broken.
+/// Constants of a phyxel's stress, which change where pairs break.
 struct PointBreakage {
   Sym3d inverse_moment;  ///< A⁻¹ [1/m²]
   Vec3d moment_offset;   ///< b [m]
@@ -52,7 +52,7 @@ class BrokenPairs {
   /// Sets the share of its volume with which phyxel i, which has broken pairs, carries stress.
   void set_carried(Index i, double carried) { broken_.at(i).carried = carried; }
 
-  /// What the stress of phyxel i depends on now; without broken pairs the values of the model.
+  /// The constants of phyxel i now; without broken pairs those of the model.
   PointBreakage of_point(Index i) const;
   /// The share of the pairs of phyxel i that are broken.
   double share(Index i) const;
@@ -60,7 +60,7 @@ class BrokenPairs {
   std::size_t bytes() const;
 
  private:
-  /// What has become of a phyxel.
+  /// The broken pairs of one phyxel.
   struct OfPhyxel {
     std::vector<Index> neighbours;  // it has broken from, ascending
     double carried = 1;             // no more than this
@@ -97,7 +97,7 @@ class CrackFaces {
   }
 
  private:
-  /// What a phyxel is as a part of a face.
+  /// Constants of a phyxel on the face of a crack.
   struct Face {
     double modulus;  // M of pressure waves [Pa]
     double spacing;  // s [m]

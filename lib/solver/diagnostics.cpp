@@ -44,7 +44,8 @@ double energy_of_following(const Model& model, Backend& backend, double time) {
 }
 
 /// Sums over the phyxels of this rank, as of `Backend::diagnostics`, on the host.
-Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) {
+Totals totals_on_host(const Model& model, Backend& backend, const Instant& now,
+                      const std::optional<Breakage>& breakage) {
   State state;
   backend.download(state);
   std::vector<Vec3d> force;
@@ -67,7 +68,6 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
   };
   const std::vector<Vec3d> free = free_axes(model);
   const std::vector<std::string> columns = history_columns(model);
-  const std::optional<Breakage> breakage = backend.breakage();
 
   std::vector<PartLaw> laws;
   std::vector<PartHistory> histories;
@@ -126,8 +126,7 @@ Totals totals_on_host(const Model& model, Backend& backend, const Instant& now) 
 }
 
 /// The energy of closed cracks [J]. Of a share: collective.
-double energy_of_closed_cracks(const Model& model, const Backend& backend) {
-  const std::optional<Breakage> breakage = backend.breakage();
+double energy_of_closed_cracks(const Model& model, const std::optional<Breakage>& breakage) {
   if (!breakage) return 0;  // the same on all ranks
   std::vector<ExactSum> sum(1);
   for (const Part& part : model.parts) {
@@ -141,14 +140,15 @@ double energy_of_closed_cracks(const Model& model, const Backend& backend) {
 
 Diagnostics diagnose(const Model& model, Backend& backend, const Instant& now) {
   check_fits(model, backend);
+  const std::optional<Breakage> breakage = backend.breakage();
   std::optional<Diagnostics> d = backend.diagnostics(now);
   if (!d) {
-    Totals all = totals_on_host(model, backend, now);
+    Totals all = totals_on_host(model, backend, now, breakage);
     if (model.share) all.add_ranks(*model.share->communicator);
     d = all.values();
   }
   d->load_energy += energy_of_following(model, backend, now.time);
-  d->contact_energy += energy_of_closed_cracks(model, backend);
+  d->contact_energy += energy_of_closed_cracks(model, breakage);
   add_rigid(model, backend.rigid_states(), now.lag, *d);
   d->step = now.step;
   d->time = now.time;

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "support/program.hpp"
+#include "support/thrown_block.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -128,29 +128,11 @@ TEST(Colouring, ABarSaysTheRangeAndLeavesTheRestAlone) {
   EXPECT_NO_THROW(draw_colour_bar(tiny, {.field = "speed"}));
 }
 
-class ColouredPictures : public test::Program {
+class ColouredPictures : public test::ThrownBlock {
  protected:
   void SetUp() override {
-    Program::SetUp();
-    write("scene.toml", R"([time]
-end = 0.02
-[solver]
-device = "cpu"
-[output]
-directory = "out"
-frames_per_second = 100
-[[body]]
-shape = "block"
-size = [1, 1, 1]
-spacing = 0.25
-velocity = [0, 0, 2]
-[body.material]
-young = 1e5
-poisson = 0.3
-density = 1000
-)");
-    const Outcome done = run({"run", "scene.toml"});
-    ASSERT_EQ(done.code, 0) << done.err;
+    ThrownBlock::SetUp();
+    throw_block(100);
   }
 };
 

@@ -8,9 +8,9 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <sstream>
 
 #include "support/beam_program.hpp"
+#include "support/csv_column.hpp"
 
 namespace phyxel {
 namespace {
@@ -57,23 +57,7 @@ class ContactsOfRuns : public test::BeamProgram {
   /// The values of the column that begins with `name`, at those lines of a log that have `word`.
   std::vector<double> values(const fs::path& log, const std::string& name,
                              const std::string& word = ",") const {
-    std::istringstream text(text_of(folder_ / log));
-    std::string line;
-    std::getline(text, line);
-    const auto cells = [](const std::string& whole) {
-      std::vector<std::string> all;
-      std::istringstream row(whole);
-      for (std::string cell; std::getline(row, cell, ',');) all.push_back(cell);
-      return all;
-    };
-    const std::vector<std::string> names = cells(line);
-    std::size_t at = 0;
-    while (at < names.size() && !names[at].starts_with(name)) ++at;
-    std::vector<double> found;
-    while (std::getline(text, line)) {
-      if (line.find(word) != std::string::npos) found.push_back(std::stod(cells(line).at(at)));
-    }
-    return found;
+    return test::csv_column(text_of(folder_ / log), name, word);
   }
   /// The values of a column at the lines of an obstacle or body in an example's log of contacts.
   std::vector<double> column(const std::string& example, const std::string& contact,

@@ -4,8 +4,8 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
+#include "support/csv_column.hpp"
 #include "support/program.hpp"
 
 namespace phyxel {
@@ -21,23 +21,10 @@ class FractureOfRuns : public test::Program {
  protected:
   /// The values of the column of energy.csv that begins with a name.
   std::vector<double> column(const std::string& name) const {
-    std::istringstream text(text_of(folder_ / "out" / "energy.csv"));
-    std::vector<double> values;
-    std::size_t at = 0;
-    bool is_header = true;
-    for (std::string line; std::getline(text, line); is_header = false) {
-      std::istringstream row(line);
-      std::vector<std::string> cells;
-      for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
-      if (!is_header) {
-        values.push_back(std::stod(cells.at(at)));
-        continue;
-      }
-      while (at < cells.size() && !cells[at].starts_with(name)) ++at;
-    }
-    return values;
+    return test::csv_column(text_of(folder_ / "out" / "energy.csv"), name);
   }
-  /// What the program says of a plate with the given lines in place of its section of fracture.
+  /// Returns the message with which the program refuses a plate with the given lines in place of
+  /// its section of fracture.
   std::string refusal(const std::string& lines) {
     write("scene.toml",
           "[time]\nend = 1e-3\n[[body]]\nshape = 'block'\nsize = [0.8, 0.6, 0.12]\n"

@@ -6,6 +6,7 @@
 
 #include "mpirun.hpp"
 #include "phyxel/checkpoint.hpp"
+#include "support/csv_column.hpp"
 
 namespace phyxel {
 namespace {
@@ -45,17 +46,7 @@ class BreakingPlate : public Mpirun {
   }
   /// The last value of a column of energy.csv.
   double last_energy(const std::string& folder, const std::string& column) const {
-    std::istringstream lines(test::text_of(folder_ / folder / "energy.csv"));
-    std::string header, last;
-    std::getline(lines, header);
-    for (std::string line; std::getline(lines, line);) last = line;
-    std::istringstream names(header), values(last);
-    for (std::string name, value;
-         std::getline(names, name, ',') && std::getline(values, value, ',');) {
-      if (name.starts_with(column)) return std::stod(value);
-    }
-    ADD_FAILURE() << "no column " << column << " in " << header;
-    return 0;
+    return test::csv_column(test::text_of(folder_ / folder / "energy.csv"), column).back();
   }
 };
 

@@ -11,8 +11,8 @@
 #include <fstream>
 
 #include "camera.hpp"
-#include "support/program.hpp"
 #include "support/skips.hpp"
+#include "support/thrown_block.hpp"
 
 namespace phyxel {
 namespace {
@@ -24,29 +24,11 @@ using ::testing::HasSubstr;
 
 constexpr std::size_t picture_bytes = 3u * 64 * 48;
 
-class Videos : public test::Program {
+class Videos : public test::ThrownBlock {
  protected:
   void SetUp() override {
-    Program::SetUp();
-    write("scene.toml", R"([time]
-end = 0.02
-[solver]
-device = "cpu"
-[output]
-directory = "out"
-frames_per_second = 200
-[[body]]
-shape = "block"
-size = [1, 1, 1]
-spacing = 0.25
-velocity = [0, 0, 2]
-[body.material]
-young = 1e5
-poisson = 0.3
-density = 1000
-)");
-    const Outcome done = run({"run", "scene.toml"});
-    ASSERT_EQ(done.code, 0) << done.err;
+    ThrownBlock::SetUp();
+    throw_block(200);
   }
   /// Makes a script the only ffmpeg on PATH. Its last argument is file:NAME.
   void use_ffmpeg(const std::string& script) {

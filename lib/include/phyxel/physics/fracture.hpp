@@ -31,18 +31,18 @@ PHYXEL_HD Real excess_growth(Vec3<Real> x, Vec3<Real> u, Real growth) {
   return fused(-growth, dot(x, x), dot(u, fused(Real(2), x, u)));
 }
 
-/// The critical growth of a pair: the smaller of those of its phyxels, so that the weaker one
-/// decides. A negative one means that the pairs of a phyxel never break; that of the pair is
+/// The critical growth of a pair: the smaller value of its two phyxels, so that the weaker one
+/// decides. A negative value means that the pairs of a phyxel never break; that of the pair is
 /// negative, too.
 template <class Real>
 PHYXEL_HD Real growth_of_pair(Real growth_i, Real growth_j) {
   return where_larger(growth_i, growth_j, growth_j, growth_i);
 }
 
-/// Four times the square of a distance [m²] by which a pair that is not broken may lengthen without
-/// breaking: (1 + s_c)|x| - |x + u| is the excess, negative, over minus the sum of both lengths, of
-/// which the first is the larger one. Rounding of the excess, some units of |x|², is taken off.
-/// Zero for a pair that breaks.
+/// Four times the square of a distance d [m²] by which an unbroken pair may lengthen without
+/// breaking: (1 + s_c)|x| - |x + u| = -excess / ((1 + s_c)|x| + |x + u|) ≥ -excess / (2 (1 +
+/// s_c)|x|) = d. The rounding error of the excess, some units of |x|², is taken off first. It is
+/// zero for a pair that breaks.
 /// @param excess of `excess_growth`. @param growth of the pair, positive. @param unit of rounding
 template <class Real>
 PHYXEL_HD Real squared_slack(Vec3<Real> x, Real excess, Real growth, Real unit) {
