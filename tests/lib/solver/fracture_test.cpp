@@ -9,6 +9,7 @@
 
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/physics/fracture.hpp"
 #include "support/folder.hpp"
 #include "support/strip.hpp"
 
@@ -267,6 +268,27 @@ TEST(Fracture, DustMakesNoEnergy) {
   const State end = solver.state();
   EXPECT_GT(end.broken.size(), 0.5 * 0.5 * static_cast<double>(model.pairs()));
   EXPECT_FALSE(end.worn.empty());
+}
+
+/// The force of a closed pair is the slope of its energy, of which each phyxel has a half; it ends
+/// where the two touch no more. Central differences of a quadratic function are exact but for
+/// rounding.
+TEST(Fracture, ForcesOfClosedPairsFollowFromTheirEnergy) {
+  const ClosedPair pair{.stiffness = 7, .rest = 0.5};
+  const Vec3d x{0.4, 0.2, -0.1}, u{-0.15, 0.05, 0.12};
+  constexpr double step = 1e-5;
+  const Vec3d force = pair.force(x, u);
+  EXPECT_GT(norm(force), 0.1);
+  for (int c = 0; c < 3; ++c) {
+    Vec3d by;
+    (c == 0 ? by.x : c == 1 ? by.y : by.z) = step;
+    // The phyxel moves the other way than the difference of displacements.
+    const double slope = 2 * (pair.energy(x, u + by) - pair.energy(x, u - by)) / (2 * step);
+    EXPECT_NEAR((c == 0 ? force.x : c == 1 ? force.y : force.z), slope, 1e-8);
+  }
+  EXPECT_EQ(pair.force(-1.0 * x, -1.0 * u), -1.0 * force);
+  EXPECT_EQ(pair.force(x, x), Vec3d{});
+  EXPECT_EQ(pair.energy(x, x), 0);
 }
 
 /// A bar that is cut through bears pressure, and no tension. Its cut is softer than its inside, as
