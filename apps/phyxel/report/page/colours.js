@@ -30,8 +30,8 @@ function rampColour(t) {
   return c.map(k => Math.round(255 * Math.min(1, Math.max(0, k.reduceRight((sum, v) => sum * t + v, 0)))));
 }
 
-/// The bar of colours, with pointed ends where values lie beyond it, and its ticks.
-function drawLegend(low, high, logarithmic) {
+/// The bar of colours, with pointed ends where values, from least to most, lie beyond it, and its ticks.
+function drawLegend(low, high, logarithmic, least, most) {
   const legend = stage.querySelector('.legend'), field = data.fields[shown.field];
   legend.hidden = !field;
   if (!field) return;
@@ -42,7 +42,7 @@ function drawLegend(low, high, logarithmic) {
     pen.fillStyle = `rgb(${rampColour(k / (width - 1)).join()})`;
     pen.fillRect(end + k, 0, 1, bar.height);
   }
-  for (const [beyond, share, tip, base] of [[field.low < low, 0, 1, end], [field.high > high, 1, bar.width - 1, bar.width - end]]) {
+  for (const [beyond, share, tip, base] of [[least < low, 0, 1, end], [most > high, 1, bar.width - 1, bar.width - end]]) {
     if (!beyond) continue;
     pen.fillStyle = `rgb(${rampColour(share).join()})`;
     pen.beginPath(); pen.moveTo(base, 0); pen.lineTo(tip, half); pen.lineTo(base, bar.height); pen.fill();

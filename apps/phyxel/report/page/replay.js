@@ -1,17 +1,6 @@
 // A trajectory: the moving body, its energies and momenta.
-const stage = document.getElementById('stage'), canvas = stage.querySelector('canvas');
 const frames = data.frames, steps = frames.length;
 
-/// Bytes of a frame, decoded when it is first shown; the last few are kept.
-const kept = new Map();
-function bytesOf(id) {
-  if (kept.has(id)) return kept.get(id);
-  const text = atob(document.getElementById(id).textContent.trim());
-  const bytes = new Uint8Array(text.length);
-  for (let k = 0; k < text.length; ++k) bytes[k] = text.charCodeAt(k);
-  kept.set(id, bytes.buffer);
-  return bytes.buffer;
-}
 const frameKept = [];
 function frameOf(k) {
   const found = frameKept.find(f => f.number === k);
@@ -31,7 +20,6 @@ function frameOf(k) {
   return frame;
 }
 
-const triangles = data.surfels ? new Uint32Array(bytesOf('triangles')) : null;
 const carriers = data.surfels && data.phyxels ? new Uint32Array(bytesOf('carriers')) : null;
 const weights = carriers ? new Uint8Array(bytesOf('weights')) : null;
 
@@ -47,12 +35,6 @@ function fieldOf(frame, family, number) {
   }
   (frame[family].fields ??= [])[number] = made;
   return made;
-}
-
-/// The body of each point of a family.
-function bodiesOf(family) {
-  const id = `${family}-bodies`;
-  return document.getElementById(id) ? new Uint16Array(bytesOf(id)) : new Uint16Array(data[family]);
 }
 
 /// Of the surface, area-weighted; in bytes for the GPU.
@@ -74,105 +56,32 @@ function normalsOf(points) {
 }
 
 // --- drawing -------------------------------------------------------------------------------------
-const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
-const view = {}, fromTheRight = [0.398, 0.697, 0.597];  // the light of a page without obstacles
-const shown = {frame: 0, field: data.fields.length ? data.opening.field : -1, log: false, surface: data.surfels > 0, phyxels: data.surfels === 0, obstacles: obstacles.length > 0, range: 'bulk'};
-let programs = null, buffers = null;
-
-function compile(vertex, fragment) {
-  const program = gl.createProgram();
-  for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
-    const shader = gl.createShader(type);
-    gl.shaderSource(shader, '#version 300 es\nprecision highp float;\n' + text);
-    gl.compileShader(shader);
-    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
-    gl.attachShader(program, shader);
-  }
-  ['point', 'field', 'normal'].forEach((name, k) => gl.bindAttribLocation(program, k, name));
-  gl.linkProgram(program);
-  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
-  const at = {};
-  for (const name of ['scale', 'low', 'turn', 'pose', 'eye', 'lens', 'range', 'origin', 'bodies', 'plain', 'ball', 'parallel', 'towards', 'fade', 'ghost', 'pass', 'shade', 'depths',
-                      'lightRows', 'shaded']) at[name] = gl.getUniformLocation(program, name);
-  return {program, at};
-}
-
-const place = `
+let buffers = null;
+const quantised = `
 in vec3 point; in float field;
-uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel; uniform vec2 range; uniform float origin;  // origin: lowest value of a field over its width; negative for linear colours
-out float value; out vec3 seen, around;
-void put() {
-  around = pose * (point * scale) + low;
-  seen = turn * around - eye;  // looking along -z
-  gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, mix(-seen.z, 1.0, parallel));  // parallel: of a light far away
-  value = origin < 0.0 ? (field - range.x) / max(range.y - range.x, 1e-6)
-                       : log(max(field + origin, 1e-7) / (range.x + origin)) / log((range.y + origin) / (range.x + origin));
-}`;
-
-function prepare() {
-  const placeOfSurface = place + `
-in vec4 normal; out vec3 facing, upright;
-void main() { put(); upright = pose * normal.xyz; facing = turn * upright; }`;
-  const surface = compile(placeOfSurface, ramp + shadows + `
-in float value; in vec3 seen, facing, around, upright; uniform vec3 towards; out vec4 colour;
-void main() {
-  vec3 n = normalize(facing), v = normalize(-seen), out_ = normalize(upright);
-  if (dot(n, v) < 0.0) { n = -n; out_ = -out_; }
-  vec3 base = baseColour(value);
-  float open = lightAt(around, out_, 0.012);
-  float light = 0.42 + 0.52 * open * max(0.0, dot(n, towards)) + 0.12 * max(0.0, dot(n, v)) + 0.14 * (1.0 - open) * (1.0 + dot(n, towards));
-  float shine = 0.18 * open * pow(max(0.0, dot(reflect(-v, n), towards)), 24.0);
-  colour = vec4(base * light + shine, 1.0);
-}`);
-  const placeOfBall = place + `
-uniform float ball;
-void main() { put(); gl_PointSize = clamp(ball / gl_Position.w, 2.0, 200.0); }`;
-  const round = `
-  vec2 p = 2.0 * gl_PointCoord - 1.0;
-  float rest = 1.0 - dot(p, p);
-  if (rest < 0.0) discard;`;
-  const balls = compile(placeOfBall, ramp + `
-in float value; in vec3 seen; uniform vec3 towards; out vec4 colour;
-void main() {${round}
-  vec3 n = vec3(p.x, -p.y, sqrt(rest));
-  vec3 base = baseColour(value);
-  colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, towards))), 1.0);
-}`);
-  programs = {surface, balls};
-  if (obstacles.length) {
-    programs.obstacle = compile(placeOfSurface, shadows + obstacleColour);
-    programs.casting = compile(placeOfSurface, 'void main() {}');
-    programs.castingBalls = compile(placeOfBall, `void main() {${round}\n}`);
-    prepareScenery();
-  }
-  buffers = {surfels: [0, 1, 2].map(() => gl.createBuffer()), phyxels: [0, 1].map(() => gl.createBuffer()), triangles: gl.createBuffer()};
-  if (triangles) {
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
-    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
-  }
-}
-
-const focal = 1 / Math.tan(35 * Math.PI / 360);  // 35 degrees from bottom to top
-
-/// The outermost points along the axes of the first view: right, up, backwards.
-const outermost = data.outermost.map(p => matrix(data.view).map(row => row[0] * p[0] + row[1] * p[1] + row[2] * p[2]));
-const middle = [0, 1].map(axis => {
-  const all = outermost.map(p => p[axis]);
-  return (Math.min(...all) + Math.max(...all)) / 2;
-});
-/// From how far all of them are seen in that view.
-function distanceForAll(aspect) {
-  return Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
-}
-
-/// Rows: right, up, backwards. Yaw and pitch are about data.axes, the last of which is up.
-function matrix(from) {
-  const [cy, sy, cp, sp] = [Math.cos(from.yaw), Math.sin(from.yaw), Math.cos(from.pitch), Math.sin(from.pitch)];
-  const rows = [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
-  return rows.map(row => [0, 1, 2].map(k => row[0] * data.axes[0][k] + row[1] * data.axes[1][k] + row[2] * data.axes[2][k]));
-}
-
-function startView() { Object.assign(view, {...data.view, distance: 1, shift: [...middle]}); }
+vec3 moved() { return point; }
+vec3 turned(vec3 normal) { return normal; }
+float shade() { return field; }`;
+const source = {
+  surfaceMotion: quantised,
+  ballMotion: quantised,
+  scale: sides,
+  low: data.low,
+  prepare() { buffers = {surfels: [0, 1, 2].map(() => gl.createBuffer()), phyxels: [0, 1].map(() => gl.createBuffer())}; },
+  frame() { return frameOf(shown.frame); },
+  clock(frame) { return `t = ${frames[frame.number].toFixed(data.decimals)} s`; },
+  span,
+  upload,
+  bindSurface() {
+    attribute(0, buffers.surfels[0], 3, gl.UNSIGNED_SHORT, true);
+    attribute(1, buffers.surfels[1], 1, gl.UNSIGNED_SHORT, true);
+    attribute(2, buffers.surfels[2], 4, gl.BYTE, true);
+  },
+  bindBalls() {
+    attribute(0, buffers.phyxels[0], 3, gl.UNSIGNED_SHORT, true);
+    attribute(1, buffers.phyxels[1], 1, gl.UNSIGNED_SHORT, true);
+  },
+};
 
 let uploaded = null;
 function upload(frame) {
@@ -189,12 +98,16 @@ function upload(frame) {
   uploaded = key;
 }
 
-/// What the colours span, in units of the field: low, high, and whether by their logarithms.
+/// What the colours span, in units of the field: low, high, and whether by their logarithms; and what 16 bits span.
 function span(frame) {
   const field = data.fields[shown.field];
-  if (!field) return [0, 1, false];
+  if (!field) return {low: 0, high: 1, logarithmic: false, from: 0, to: 1};
+  const bits = {from: field.low, to: field.high};
   const log = shown.log && field.decades[0] > 0;
-  if (shown.range === 'bulk') return log ? [...field.decades, true] : [...field.bulk, false];
+  if (shown.range === 'bulk') {
+    const [low, high] = log ? field.decades : field.bulk;
+    return {low, high, logarithmic: log, ...bits};
+  }
   let [low, high] = [field.low, field.high];
   if (shown.range === 'one') {
     const f = fieldOf(frame, frame.surfels && (shown.surface || !frame.phyxels) ? 'surfels' : 'phyxels', shown.field);
@@ -202,82 +115,8 @@ function span(frame) {
     for (const v of f) { if (v < least) least = v; if (v > most) most = v; }
     [low, high] = [least, most].map(v => field.low + v / 65535 * (field.high - field.low));
   }
-  return log && high > 0 ? [Math.max(low, high / 1000), high, true] : [low, high, false];
-}
-
-function draw() {
-  const frame = frameOf(shown.frame), time = frames[shown.frame];
-  stage.querySelector('.clock').textContent = `t = ${time.toFixed(data.decimals)} s`;
-  const [low, high, logarithmic] = span(frame), field = data.fields[shown.field];
-  drawLegend(low, high, logarithmic);
-  for (const chart of charts) chart.now(time);
-  if (!gl) return;
-  const ratio = Math.min(2, window.devicePixelRatio || 1);
-  const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
-  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
-  upload(frame);
-  gl.enable(gl.DEPTH_TEST);
-  const aspect = width / height, distance = view.distance * distanceForAll(aspect);
-  const scene = shown.obstacles;
-  const near = scene ? 0.02 * distance : Math.max(0.01, distance - 2.5), far = distance + (scene ? fade[1] + 1 : 2.5);
-  const rows = matrix(view), turn = columns(rows.flat());
-  const spread = field ? Math.max(field.high - field.low, 1e-300) : 1;
-  const eye = {turn, eye: [view.shift[0], view.shift[1], distance], lens: [focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
-  const use = (seenFrom, {program, at}) => {
-    gl.useProgram(program);
-    gl.uniformMatrix3fv(at.pose, false, [1, 0, 0, 0, 1, 0, 0, 0, 1]);
-    gl.uniform3fv(at.scale, sides);
-    gl.uniform3fv(at.low, data.low);
-    gl.uniformMatrix3fv(at.turn, false, seenFrom.turn);
-    gl.uniform3fv(at.eye, seenFrom.eye);
-    gl.uniform4fv(at.lens, seenFrom.lens.slice(0, 4));
-    gl.uniform1f(at.bodies, field ? 0 : 1);
-    gl.uniform1f(at.origin, logarithmic ? field.low / spread : -1);
-    gl.uniform1f(at.parallel, seenFrom.lens[4]);
-    gl.uniform2f(at.range, field ? (low - field.low) / spread : 0, field ? (high - field.low) / spread : 1);
-    gl.uniform3fv(at.towards, scene ? rows.map(row => row[0] * light.towards[0] + row[1] * light.towards[1] + row[2] * light.towards[2]) : fromTheRight);
-    return at;
-  };
-  const attribute = (k, buffer, size, type, normalised) => {
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.enableVertexAttribArray(k);
-    gl.vertexAttribPointer(k, size, type, normalised, 0, 0);
-  };
-  const drawSurface = () => {
-    attribute(0, buffers.surfels[0], 3, gl.UNSIGNED_SHORT, true);
-    attribute(1, buffers.surfels[1], 1, gl.UNSIGNED_SHORT, true);
-    attribute(2, buffers.surfels[2], 4, gl.BYTE, true);
-    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
-    gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
-  };
-  const drawBalls = (at, size) => {
-    gl.disableVertexAttribArray(2);
-    gl.uniform1f(at.ball, size);
-    attribute(0, buffers.phyxels[0], 3, gl.UNSIGNED_SHORT, true);
-    attribute(1, buffers.phyxels[1], 1, gl.UNSIGNED_SHORT, true);
-    gl.drawArrays(gl.POINTS, 0, data.phyxels);
-  };
-  const surface = shown.surface && frame.surfels, balls = shown.phyxels && frame.phyxels;
-  if (scene) {
-    const lightEye = {turn: columns(light.rows.flat()), eye: [0, 0, 0], lens: [1 / lit, 1 / lit, -1 / lightDepth, 0, 1]};
-    drawShadows(frame.number, program => use(lightEye, program), () => {
-      if (surface) { use(lightEye, programs.casting); drawSurface(); }
-      else if (balls) drawBalls(use(lightEye, programs.castingBalls), data.spacing * 0.7 * texels / 2 / lit);
-    });
-  }
-  gl.viewport(0, 0, width, height);
-  gl.clearColor(0, 0, 0, 0);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-  if (surface) {
-    const at = use(eye, programs.surface);
-    bindShadows(at, scene);
-    drawSurface();
-  }
-  if (balls) {
-    const at = use(eye, programs.balls);
-    drawBalls(at, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
-  }
-  if (scene) drawObstacles(frame.number, program => { const at = use(eye, program); bindShadows(at, true); return at; });
+  const logarithmic = log && high > 0;
+  return {low: logarithmic ? Math.max(low, high / 1000) : low, high, logarithmic, ...bits};
 }
 
 // --- charts --------------------------------------------------------------------------------------
@@ -315,6 +154,7 @@ let playing = null;
 function show(k) {
   shown.frame = Math.min(steps - 1, Math.max(0, k));
   slider.value = shown.frame;
+  for (const chart of charts) chart.now(frames[shown.frame]);
   draw();
 }
 function pause() { if (playing) cancelAnimationFrame(playing.request); playing = null; playButton.textContent = '▶ Play'; }
@@ -365,28 +205,7 @@ function control() {
   }
   document.getElementById('with-obstacles').hidden = !obstacles.length;
   if (data.only_floor) document.querySelector('#with-obstacles span').textContent = 'floor';
-  document.getElementById('reset').addEventListener('click', () => { startView(); draw(); });
-  const pointers = new Map();
-  canvas.addEventListener('pointerdown', event => { canvas.setPointerCapture(event.pointerId); pointers.set(event.pointerId, event); });
-  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, event => pointers.delete(event.pointerId));
-  canvas.addEventListener('pointermove', event => {
-    const before = pointers.get(event.pointerId);
-    if (!before) return;
-    const dx = event.clientX - before.clientX, dy = event.clientY - before.clientY, size = canvas.clientHeight;
-    if (pointers.size === 2) {
-      const other = [...pointers.values()].find(p => p.pointerId !== event.pointerId);
-      const apart = p => Math.hypot(p.clientX - other.clientX, p.clientY - other.clientY) || 1;
-      zoom(apart(before) / apart(event));
-    } else if (event.shiftKey || event.buttons & 6) {
-      view.shift[0] -= 2.2 * view.distance * dx / size; view.shift[1] += 2.2 * view.distance * dy / size;
-    } else {
-      view.yaw -= 3 * dx / size; view.pitch = Math.min(1.57, Math.max(-1.57, view.pitch + 3 * dy / size));
-    }
-    pointers.set(event.pointerId, event);
-    draw();
-  });
-  const zoom = by => { view.distance = Math.min(8, Math.max(0.05, view.distance * by)); };
-  canvas.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(event.deltaY / 700)); draw(); }, {passive: false});
+  watchPointers();
   document.addEventListener('keydown', event => {
     if (['INPUT', 'SELECT', 'TEXTAREA'].includes(event.target.tagName) && event.target.type !== 'range') return;
     if (event.key === ' ') { event.preventDefault(); playing ? pause() : play(); }
@@ -396,7 +215,6 @@ function control() {
     if (event.key === 'Home') { pause(); show(0); }
     if (event.key === 'End') { pause(); show(steps - 1); }
   });
-  new ResizeObserver(draw).observe(canvas);
 }
 
 function addTiming() {
@@ -404,20 +222,6 @@ function addTiming() {
   document.getElementById('timing').append(element('table', {}, ...data.timing.map(([name, seconds]) => element('tr', {},
     element('td', {}, name), element('td', {class: 'number'}, `${short(seconds)} s`),
     element('td', {style: 'width: 50%'}, element('div', {class: 'bar', style: `width: ${100 * seconds / longest}%`}))))));
-}
-
-/// For whoever tests the page: how much of the stage is drawn on, and what went wrong.
-function tell(state) {
-  document.body.dataset.state = state;
-  if (!gl) return;
-  const pixels = new Uint8Array(4 * canvas.width * canvas.height);
-  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
-  let drawn = 0;
-  for (let k = 3; k < pixels.length; k += 4) if (pixels[k]) ++drawn;
-  document.body.dataset.drawn = (drawn / (canvas.width * canvas.height)).toFixed(4);
-  document.body.dataset.frame = shown.frame;
-  document.body.dataset.obstacles = scenery.parts.length;
-  document.body.dataset.error = gl.getError();
 }
 
 addCharts();

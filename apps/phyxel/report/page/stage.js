@@ -1,0 +1,253 @@
+// The stage of a page: bodies and obstacles, seen by a camera that the pointer turns. The page's `source` has the bodies: how
+// shaders place them, the buffers that they read, and the colours.
+const stage = document.getElementById('stage'), canvas = stage.querySelector('canvas');
+
+/// Bytes of a frame, decoded when it is first shown; the last few are kept.
+const kept = new Map();
+function bytesOf(id) {
+  if (kept.has(id)) return kept.get(id);
+  const text = atob(document.getElementById(id).textContent.trim());
+  const bytes = new Uint8Array(text.length);
+  for (let k = 0; k < text.length; ++k) bytes[k] = text.charCodeAt(k);
+  kept.set(id, bytes.buffer);
+  return bytes.buffer;
+}
+const triangles = data.surfels ? new Uint32Array(bytesOf('triangles')) : null;
+
+/// The body of each point of a family.
+function bodiesOf(family) {
+  const id = `${family}-bodies`;
+  return document.getElementById(id) ? new Uint16Array(bytesOf(id)) : new Uint16Array(data[family]);
+}
+
+// --- drawing -------------------------------------------------------------------------------------
+const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
+const view = {}, fromTheRight = [0.398, 0.697, 0.597];  // the light of a page without obstacles
+const shown = {frame: 0, field: data.fields.length ? data.opening.field : -1, log: false, surface: data.surfels > 0, phyxels: data.surfels === 0, obstacles: obstacles.length > 0, range: 'bulk'};
+let programs = null, cornerBuffer = null;
+
+function compile(vertex, fragment) {
+  const program = gl.createProgram();
+  for (const [type, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
+    const shader = gl.createShader(type);
+    gl.shaderSource(shader, '#version 300 es\nprecision highp float;\n' + text);
+    gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+    gl.attachShader(program, shader);
+  }
+  ['point', 'field', 'normal', 'carriers', 'weights'].forEach((name, k) => gl.bindAttribLocation(program, k, name));
+  gl.linkProgram(program);
+  if (!gl.getProgramParameter(program, gl.LINK_STATUS)) throw new Error(gl.getProgramInfoLog(program));
+  const at = {};
+  for (let k = 0; k < gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS); ++k) {
+    const {name} = gl.getActiveUniform(program, k);
+    at[name] = gl.getUniformLocation(program, name);
+  }
+  return {program, at};
+}
+
+/// A vertex shader's part that places a point. motion: moved(), its place in units of `scale`; turned(normal); shade(), its field.
+const place = motion => motion + `
+uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel; uniform vec2 range; uniform float origin;  // origin: lowest value of a field over its width; negative for linear colours
+out float value; out vec3 seen, around;
+void put() {
+  around = pose * (moved() * scale) + low;
+  seen = turn * around - eye;  // looking along -z
+  gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, mix(-seen.z, 1.0, parallel));  // parallel: of a light far away
+  float field = shade();
+  value = origin < 0.0 ? (field - range.x) / max(range.y - range.x, 1e-6)
+                       : log(max(field + origin, 1e-7) / (range.x + origin)) / log((range.y + origin) / (range.x + origin));
+}`;
+/// Points that stay where they are.
+const still = `
+in vec3 point;
+vec3 moved() { return point; }
+vec3 turned(vec3 normal) { return normal; }
+float shade() { return 0.0; }`;
+
+function prepare() {
+  const placeOfSurface = motion => place(motion) + `
+in vec4 normal; out vec3 facing, upright;
+void main() { put(); upright = pose * turned(normal.xyz); facing = turn * upright; }`;
+  const surface = compile(placeOfSurface(source.surfaceMotion), ramp + shadows + `
+in float value; in vec3 seen, facing, around, upright; uniform vec3 towards; out vec4 colour;
+void main() {
+  vec3 n = normalize(facing), v = normalize(-seen), out_ = normalize(upright);
+  if (dot(n, v) < 0.0) { n = -n; out_ = -out_; }
+  vec3 base = baseColour(value);
+  float open = lightAt(around, out_, 0.012);
+  float light = 0.42 + 0.52 * open * max(0.0, dot(n, towards)) + 0.12 * max(0.0, dot(n, v)) + 0.14 * (1.0 - open) * (1.0 + dot(n, towards));
+  float shine = 0.18 * open * pow(max(0.0, dot(reflect(-v, n), towards)), 24.0);
+  colour = vec4(base * light + shine, 1.0);
+}`);
+  const placeOfBall = place(source.ballMotion) + `
+uniform float ball;
+void main() { put(); gl_PointSize = clamp(ball / gl_Position.w, 2.0, 200.0); }`;
+  const round = `
+  vec2 p = 2.0 * gl_PointCoord - 1.0;
+  float rest = 1.0 - dot(p, p);
+  if (rest < 0.0) discard;`;
+  const balls = compile(placeOfBall, ramp + `
+in float value; in vec3 seen; uniform vec3 towards; out vec4 colour;
+void main() {${round}
+  vec3 n = vec3(p.x, -p.y, sqrt(rest));
+  vec3 base = baseColour(value);
+  colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, towards))), 1.0);
+}`);
+  programs = {surface, balls};
+  if (obstacles.length) {
+    programs.obstacle = compile(placeOfSurface(still), shadows + obstacleColour);
+    programs.casting = compile(placeOfSurface(still), 'void main() {}');
+    programs.castingSurface = compile(placeOfSurface(source.surfaceMotion), 'void main() {}');
+    programs.castingBalls = compile(placeOfBall, `void main() {${round}\n}`);
+    prepareScenery();
+  }
+  source.prepare();
+  if (triangles) cornerBuffer = filled(gl.ELEMENT_ARRAY_BUFFER, triangles);
+}
+
+/// A buffer with the numbers of an array.
+function filled(kind, array) {
+  const buffer = gl.createBuffer();
+  gl.bindBuffer(kind, buffer);
+  gl.bufferData(kind, array, gl.STATIC_DRAW);
+  return buffer;
+}
+
+/// Sets the buffer of an attribute.
+function attribute(k, buffer, size, type, normalised) {
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.enableVertexAttribArray(k);
+  gl.vertexAttribPointer(k, size, type, normalised, 0, 0);
+}
+
+const focal = 1 / Math.tan(35 * Math.PI / 360);  // 35 degrees from bottom to top
+
+/// The outermost points along the axes of the first view: right, up, backwards.
+const outermost = data.outermost.map(p => matrix(data.view).map(row => row[0] * p[0] + row[1] * p[1] + row[2] * p[2]));
+const middle = [0, 1].map(axis => {
+  const all = outermost.map(p => p[axis]);
+  return (Math.min(...all) + Math.max(...all)) / 2;
+});
+/// From how far all of them are seen in that view.
+function distanceForAll(aspect) {
+  return Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
+}
+
+/// Rows: right, up, backwards. Yaw and pitch are about data.axes, the last of which is up.
+function matrix(from) {
+  const [cy, sy, cp, sp] = [Math.cos(from.yaw), Math.sin(from.yaw), Math.cos(from.pitch), Math.sin(from.pitch)];
+  const rows = [[-sy, cy, 0], [-cy * sp, -sy * sp, cp], [cy * cp, sy * cp, sp]];
+  return rows.map(row => [0, 1, 2].map(k => row[0] * data.axes[0][k] + row[1] * data.axes[1][k] + row[2] * data.axes[2][k]));
+}
+
+function startView() { Object.assign(view, {...data.view, distance: 1, shift: [...middle]}); }
+
+function draw() {
+  const frame = source.frame();
+  stage.querySelector('.clock').textContent = source.clock(frame);
+  // Colours span low to high, in units of the field; shaders are given its shares of from to to.
+  const {low, high, logarithmic, from, to} = source.span(frame), field = data.fields[shown.field];
+  drawLegend(low, high, logarithmic, from, to);
+  if (!gl) return;
+  const ratio = Math.min(2, window.devicePixelRatio || 1);
+  const width = Math.max(1, Math.round(canvas.clientWidth * ratio)), height = Math.max(1, Math.round(canvas.clientHeight * ratio));
+  if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
+  source.upload(frame);
+  gl.enable(gl.DEPTH_TEST);
+  const aspect = width / height, distance = view.distance * distanceForAll(aspect);
+  const scene = shown.obstacles;
+  const near = scene ? 0.02 * distance : Math.max(0.01, distance - 2.5), far = distance + (scene ? fade[1] + 1 : 2.5);
+  const rows = matrix(view), turn = columns(rows.flat());
+  const spread = field ? Math.max(to - from, 1e-300) : 1;
+  const eye = {turn, eye: [view.shift[0], view.shift[1], distance], lens: [focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
+  const use = (seenFrom, {program, at}) => {
+    gl.useProgram(program);
+    gl.uniformMatrix3fv(at.pose, false, [1, 0, 0, 0, 1, 0, 0, 0, 1]);
+    gl.uniform3fv(at.scale, source.scale);
+    gl.uniform3fv(at.low, source.low);
+    gl.uniformMatrix3fv(at.turn, false, seenFrom.turn);
+    gl.uniform3fv(at.eye, seenFrom.eye);
+    gl.uniform4fv(at.lens, seenFrom.lens.slice(0, 4));
+    gl.uniform1f(at.bodies, field ? 0 : 1);
+    gl.uniform1f(at.origin, logarithmic ? from / spread : -1);
+    gl.uniform1f(at.parallel, seenFrom.lens[4]);
+    gl.uniform2f(at.range, field ? (low - from) / spread : 0, field ? (high - from) / spread : 1);
+    gl.uniform3fv(at.towards, scene ? rows.map(row => row[0] * light.towards[0] + row[1] * light.towards[1] + row[2] * light.towards[2]) : fromTheRight);
+    return at;
+  };
+  const drawSurface = at => {
+    source.bindSurface(at);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, cornerBuffer);
+    gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
+  };
+  const drawBalls = (at, size) => {
+    gl.disableVertexAttribArray(2);
+    gl.uniform1f(at.ball, size);
+    source.bindBalls(at);
+    gl.drawArrays(gl.POINTS, 0, data.phyxels);
+  };
+  const surface = shown.surface && frame.surfels, balls = shown.phyxels && frame.phyxels;
+  if (scene) {
+    const lightEye = {turn: columns(light.rows.flat()), eye: [0, 0, 0], lens: [1 / lit, 1 / lit, -1 / lightDepth, 0, 1]};
+    drawShadows(frame.number, program => use(lightEye, program), () => {
+      if (surface) drawSurface(use(lightEye, programs.castingSurface));
+      else if (balls) drawBalls(use(lightEye, programs.castingBalls), data.spacing * 0.7 * texels / 2 / lit);
+    });
+  }
+  gl.viewport(0, 0, width, height);
+  gl.clearColor(0, 0, 0, 0);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  if (surface) {
+    const at = use(eye, programs.surface);
+    bindShadows(at, scene);
+    drawSurface(at);
+  }
+  if (balls) {
+    const at = use(eye, programs.balls);
+    drawBalls(at, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
+  }
+  if (scene) drawObstacles(frame.number, program => { const at = use(eye, program); bindShadows(at, true); return at; });
+}
+
+// --- pointers ------------------------------------------------------------------------------------
+/// Lets pointers turn, shift and enlarge what is seen, unless the page takes them (`source.takes`).
+function watchPointers() {
+  const pointers = new Map();
+  canvas.addEventListener('pointerdown', event => { canvas.setPointerCapture(event.pointerId); pointers.set(event.pointerId, event); });
+  for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, event => pointers.delete(event.pointerId));
+  canvas.addEventListener('pointermove', event => {
+    const before = pointers.get(event.pointerId);
+    if (!before || source.takes?.(event)) return;
+    const dx = event.clientX - before.clientX, dy = event.clientY - before.clientY, size = canvas.clientHeight;
+    if (pointers.size === 2) {
+      const other = [...pointers.values()].find(p => p.pointerId !== event.pointerId);
+      const apart = p => Math.hypot(p.clientX - other.clientX, p.clientY - other.clientY) || 1;
+      zoom(apart(before) / apart(event));
+    } else if (event.shiftKey || event.buttons & 6) {
+      view.shift[0] -= 2.2 * view.distance * dx / size; view.shift[1] += 2.2 * view.distance * dy / size;
+    } else {
+      view.yaw -= 3 * dx / size; view.pitch = Math.min(1.57, Math.max(-1.57, view.pitch + 3 * dy / size));
+    }
+    pointers.set(event.pointerId, event);
+    draw();
+  });
+  const zoom = by => { view.distance = Math.min(8, Math.max(0.05, view.distance * by)); };
+  canvas.addEventListener('wheel', event => { event.preventDefault(); zoom(Math.exp(event.deltaY / 700)); draw(); }, {passive: false});
+  document.getElementById('reset').addEventListener('click', () => { startView(); draw(); });
+  new ResizeObserver(draw).observe(canvas);
+}
+
+/// For whoever tests the page: how much of the stage is drawn on, and what went wrong.
+function tell(state) {
+  document.body.dataset.state = state;
+  if (!gl) return;
+  const pixels = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  let drawn = 0;
+  for (let k = 3; k < pixels.length; k += 4) if (pixels[k]) ++drawn;
+  document.body.dataset.drawn = (drawn / (canvas.width * canvas.height)).toFixed(4);
+  document.body.dataset.frame = shown.frame;
+  document.body.dataset.obstacles = scenery.parts.length;
+  document.body.dataset.error = gl.getError();
+}
