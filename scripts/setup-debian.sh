@@ -10,6 +10,7 @@ set -euo pipefail
 build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev libfmt-dev
        libhdf5-dev libxxhash-dev libpng-dev libtinyobjloader-dev nlohmann-json3-dev
        libmetis-dev libopenmpi-dev openmpi-bin
+       libboost-dev          # phyxel view
        gnuplot-nox           # the figures of phyxel paper
        ffmpeg                # phyxel render --video
        help2man dpkg-dev)    # the manual page, and packages

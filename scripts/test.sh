@@ -45,7 +45,7 @@ in_ci() { [[ -n ${CI-} && $CI != 0 && $CI != false ]]; }
 # In CI the configuration requires optional parts.
 insist=()
 if in_ci; then
-  insist=(-DPHYXEL_MPI=ON)
+  insist=(-DPHYXEL_MPI=ON -DPHYXEL_VIEW=ON)
 fi
 
 # Lists missing tools without which tests are not registered or skip.

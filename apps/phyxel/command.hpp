@@ -7,6 +7,7 @@
 namespace phyxel::app {
 
 void add_run(CLI::App& program);
+void add_view(CLI::App& program);
 void add_sample(CLI::App& program);
 void add_info(CLI::App& program);
 void add_export(CLI::App& program);

@@ -17,15 +17,16 @@ using phyxel::app::ranks;
 
 /// Refuses commands that do not run on several ranks. @throws AgreedError
 void check_ranks(const CLI::App& program) {
-  if (ranks().size() == 1 || program.got_subcommand("run") || program.got_subcommand("doctor") ||
+  if (ranks().size() == 1 || program.got_subcommand("run") || program.got_subcommand("view") ||
+      program.got_subcommand("doctor") ||
       program.get_subcommand("bench")->got_subcommand("scaling")) {
     return;
   }
-  throw phyxel::AgreedError(
-      phyxel::ExitCode::bad_input,
-      fmt::format("{} ranks; allowed with \"phyxel run\", \"phyxel doctor\" and \"phyxel bench "
-                  "scaling\"; start other commands without mpirun",
-                  ranks().size()));
+  throw phyxel::AgreedError(phyxel::ExitCode::bad_input,
+                            fmt::format("{} ranks; allowed with \"phyxel run\", \"phyxel view\", "
+                                        "\"phyxel doctor\" and \"phyxel bench "
+                                        "scaling\"; start other commands without mpirun",
+                                        ranks().size()));
 }
 
 }  // namespace
@@ -41,6 +42,7 @@ int main(int argc, char** argv) {
       "Examples:\n"
       "  phyxel examples copy dino                       copy one of the examples\n"
       "  phyxel run dino/scene.toml                      simulate, write, draw\n"
+      "  phyxel view dino/scene.toml                     run it live in a browser\n"
       "  phyxel sample bunny.obj --phyxels 5000 --out bunny.h5\n"
       "  phyxel info out/dino/phyxels.hdf.series         show the content of a file\n"
       "\n"
@@ -49,6 +51,7 @@ int main(int argc, char** argv) {
       "files\n"
       "are intact; 75 stopped by a signal, continue with --resume auto.");
   phyxel::app::add_run(program);
+  phyxel::app::add_view(program);
   phyxel::app::add_sample(program);
   phyxel::app::add_render(program);
   phyxel::app::add_info(program);

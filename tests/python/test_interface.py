@@ -2,9 +2,12 @@
 import ast
 import importlib
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
+import urllib.error
+import urllib.request
 
 import numpy as np
 import pytest
@@ -56,6 +59,26 @@ def test_the_command_is_the_program():
     assert said("--version").stdout.split()[:2] == phyxel.version.split()[:2]  # the commit may differ in a build of parts
     wrong = said("rnu")
     assert wrong.returncode == 2 and wrong.stderr.startswith("phyxel: error: rnu: unknown command (did you mean \"run\"?)")
+
+
+def test_view_serves_a_page(tmp_path):
+    scene = tmp_path / "scene.toml"
+    scene.write_text("[time]\nend = 1\n[solver]\ndevice = 'cpu'\nthreads = 1\n[[body]]\nshape = 'beam'\n"
+                     "size = [1, 0.2, 0.2]\nspacing = 0.1\n[body.material]\nyoung = 1e5\npoisson = 0.3\ndensity = 1000\n")
+    with phyxel.view(scene, paused=True, out=tmp_path / "out") as live:
+        assert re.fullmatch(r"http://127\.0\.0\.1:\d+/\?token=[0-9a-f]{32}", live.address)
+        assert live.address in live._repr_html_()
+        with urllib.request.urlopen(live.address) as answer:
+            assert b"<canvas" in answer.read()
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(live.address[:-1])
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(live.address)
+    scene.write_text("[time]\nend = 1\n")
+    with pytest.raises(RuntimeError, match="body"):
+        phyxel.view(scene)
+    with pytest.raises(TypeError, match="pcae"):
+        phyxel.view(scene, pcae=1)
 
 
 def test_the_command_of_a_module_without_a_program_says_so(tmp_path):

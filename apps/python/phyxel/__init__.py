@@ -45,11 +45,12 @@ from ._phyxel import (Cloud, DeviceError, DivergedError, Error, Frame, InputErro
                       OutputError, SimulationBase, inspect, read_body, read_frame, read_mesh,
                       sample, shape, version)
 from ._phyxel import read_series as _read_series
+from ._view import View, view
 
 __version__ = version.split()[1]
 __all__ = ["Cloud", "DeviceError", "DivergedError", "Error", "Frame", "InputError", "Live",
-           "OutputError", "Simulation", "Trajectory", "inspect", "read_body", "read_frame",
-           "read_mesh", "run", "sample", "shape", "to_toml", "version"]
+           "OutputError", "Simulation", "Trajectory", "View", "inspect", "read_body", "read_frame",
+           "read_mesh", "run", "sample", "shape", "to_toml", "version", "view"]
 
 
 def _text(text):

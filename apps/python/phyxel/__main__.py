@@ -1,17 +1,9 @@
 """`python -m phyxel`: the command-line program, as `phyxel` in a shell."""
 
 import os
-import pathlib
 import sys
 
-
-def program():
-    """The program that belongs to this module: beside it if pip installed both, else of its build."""
-    package = pathlib.Path(__file__).resolve().parent
-    for file in (package / "bin" / "phyxel", package.parents[1] / "bin" / "phyxel"):
-        if os.access(file, os.X_OK) and file.is_file():
-            return file
-    return None
+from phyxel._program import program
 
 
 def main():

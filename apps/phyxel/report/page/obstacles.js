@@ -86,8 +86,8 @@ function placeOf(obstacle, frame) {
   const place = obstacle.places[Math.min(frame, obstacle.places.length - 1)];
   const turn = place.slice(0, 9), at = place.slice(9);
   if (obstacle.shape !== 'plane') return {turn, at};
-  const normal = [turn[2], turn[5], turn[8]], height = normal[0] * at[0] + normal[1] * at[1] + normal[2] * at[2];
-  return {turn: turn.map(x => fade[1] * x), at: normal.map(x => height * x)};
+  const normal = [turn[2], turn[5], turn[8]], middle = about(), height = dot3(normal, at) - dot3(normal, middle);
+  return {turn: turn.map(x => fade[1] * x), at: normal.map((x, k) => middle[k] + height * x)};
 }
 
 /// The columns of a matrix that is given row by row, as WebGL takes them.
@@ -110,15 +110,15 @@ const light = (() => {
 const lit = obstacles.some(o => o.shape !== 'plane' && !o.hollow) ? 1.6 : 1.05, lightDepth = 8, texels = 2048;
 
 /// The share of the light that reaches a place: percentage-closer soft shadows (Fernando 2005), as in `phyxel render`.
-const shadows = !obstacles.length ? 'float lightAt(vec3 place, vec3 normal, float clear) { return 1.0; }' : `
-uniform highp sampler2DShadow shade; uniform highp sampler2D depths; uniform mat3 lightRows; uniform float shaded;
+const shadows = !obstacles.length ? 'uniform vec3 about; float lightAt(vec3 place, vec3 normal, float clear) { return 1.0; }' : `
+uniform highp sampler2DShadow shade; uniform highp sampler2D depths; uniform mat3 lightRows; uniform float shaded; uniform vec3 about;
 vec2 spread(int k, int n, float start) {
   float angle = 2.39996323 * float(k) + start, r = sqrt((float(k) + 0.5) / float(n));
   return r * vec2(cos(angle), sin(angle));
 }
 float lightAt(vec3 place, vec3 normal, float clear) {
   if (shaded == 0.0) return 1.0;
-  vec3 p = lightRows * (place + clear * normal);
+  vec3 p = lightRows * (place - about + clear * normal);
   vec3 at = vec3(p.xy / ${lit.toFixed(3)}, -p.z / ${lightDepth.toFixed(1)}) * 0.5 + 0.5;
   vec2 edge = abs(at.xy - 0.5);
   float inside = 1.0 - smoothstep(0.47, 0.5, max(edge.x, edge.y));
@@ -246,7 +246,7 @@ void main() {
   vec3 n = normalize(facing), v = normalize(-seen);
   float side = dot(n, v) < 0.0 ? -1.0 : 1.0;
   bool through = ghost * side > 0.0;
-  float opacity = 1.0 - smoothstep(fade.x, fade.y, length(around));
+  float opacity = 1.0 - smoothstep(fade.x, fade.y, length(around - about));
   if (pass == 2.0) { colour = vec4(0.3, 0.32, 0.36, 0.45 * opacity); return; }
   if (through != (pass == 1.0)) discard;
   if (through) opacity *= ghost < 0.0 ? 0.25 : 0.12;

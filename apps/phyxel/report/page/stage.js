@@ -121,6 +121,7 @@ function attribute(k, buffer, size, type, normalised) {
   gl.vertexAttribPointer(k, size, type, normalised, 0, 0);
 }
 
+const dot3 = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 const focal = 1 / Math.tan(35 * Math.PI / 360);  // 35 degrees from bottom to top
 
 /// The outermost points along the axes of the first view: right, up, backwards.
@@ -141,10 +142,21 @@ function matrix(from) {
   return rows.map(row => [0, 1, 2].map(k => row[0] * data.axes[0][k] + row[1] * data.axes[1][k] + row[2] * data.axes[2][k]));
 }
 
+/// The place that the view is about, in units of the radius: the middle, or what a page follows.
+function about() { return source.about?.() ?? [0, 0, 0]; }
+/// From how far it is seen.
+function distanceFor(aspect) { return view.distance * distanceForAll(aspect) * (source.farther?.() ?? 1); }
+/// The eye in the camera's directions.
+function eyeOf(rows, aspect) {
+  const from = about();
+  return [view.shift[0], view.shift[1], distanceFor(aspect)].map((x, k) => x + dot3(rows[k], from));
+}
+
 function startView() { Object.assign(view, {...data.view, distance: 1, shift: [...middle]}); }
 
 function draw() {
   const frame = source.frame();
+  if (!frame) return;  // none has come yet
   stage.querySelector('.clock').textContent = source.clock(frame);
   // Colours span low to high, in units of the field; shaders are given its shares of from to to.
   const {low, high, logarithmic, from, to} = source.span(frame), field = data.fields[shown.field];
@@ -155,17 +167,18 @@ function draw() {
   if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
   source.upload(frame);
   gl.enable(gl.DEPTH_TEST);
-  const aspect = width / height, distance = view.distance * distanceForAll(aspect);
+  const aspect = width / height, distance = distanceFor(aspect);
   const scene = shown.obstacles;
   const near = scene ? 0.02 * distance : Math.max(0.01, distance - 2.5), far = distance + (scene ? fade[1] + 1 : 2.5);
   const rows = matrix(view), turn = columns(rows.flat());
   const spread = field ? Math.max(to - from, 1e-300) : 1;
-  const eye = {turn, eye: [view.shift[0], view.shift[1], distance], lens: [focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
+  const eye = {turn, eye: eyeOf(rows, aspect), lens: [focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
   const use = (seenFrom, {program, at}) => {
     gl.useProgram(program);
     gl.uniformMatrix3fv(at.pose, false, [1, 0, 0, 0, 1, 0, 0, 0, 1]);
     gl.uniform3fv(at.scale, source.scale);
     gl.uniform3fv(at.low, source.low);
+    gl.uniform3fv(at.about, about());
     gl.uniformMatrix3fv(at.turn, false, seenFrom.turn);
     gl.uniform3fv(at.eye, seenFrom.eye);
     gl.uniform4fv(at.lens, seenFrom.lens.slice(0, 4));
@@ -189,7 +202,7 @@ function draw() {
   };
   const surface = shown.surface && frame.surfels, balls = shown.phyxels && frame.phyxels;
   if (scene) {
-    const lightEye = {turn: columns(light.rows.flat()), eye: [0, 0, 0], lens: [1 / lit, 1 / lit, -1 / lightDepth, 0, 1]};
+    const lightEye = {turn: columns(light.rows.flat()), eye: light.rows.map(row => dot3(row, about())), lens: [1 / lit, 1 / lit, -1 / lightDepth, 0, 1]};
     drawShadows(frame.number, program => use(lightEye, program), () => {
       if (surface) drawSurface(use(lightEye, programs.castingSurface));
       else if (balls) drawBalls(use(lightEye, programs.castingBalls), data.spacing * 0.7 * texels / 2 / lit);
@@ -214,7 +227,10 @@ function draw() {
 /// Lets pointers turn, shift and enlarge what is seen, unless the page takes them (`source.takes`).
 function watchPointers() {
   const pointers = new Map();
-  canvas.addEventListener('pointerdown', event => { canvas.setPointerCapture(event.pointerId); pointers.set(event.pointerId, event); });
+  canvas.addEventListener('pointerdown', event => {
+    canvas.setPointerCapture(event.pointerId);
+    pointers.set(event.pointerId, event);
+  });
   for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, event => pointers.delete(event.pointerId));
   canvas.addEventListener('pointermove', event => {
     const before = pointers.get(event.pointerId);

@@ -1,0 +1,145 @@
+#include "view/live_page.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <span>
+
+#include "drawn_obstacles.hpp"
+#include "phyxel/law_table.hpp"
+#include "report/page.hpp"
+#include "report/replay_obstacles.hpp"
+#include "rigid_paths.hpp"
+#include "scene/upright.hpp"
+#include "version.hpp"
+
+namespace phyxel::app {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Points in units of the radius of an extent, about its centre.
+std::vector<float> scaled(const std::vector<Vec3d>& points, const Extent& extent) {
+  std::vector<float> numbers;
+  for (const Vec3d p : points) {
+    const Vec3d centred = (1 / extent.radius) * (p - extent.centre());
+    for (int axis = 0; axis < 3; ++axis) {
+      numbers.push_back(static_cast<float>(component(centred, axis)));
+    }
+  }
+  return numbers;
+}
+
+/// The obstacles that are drawn: those of the scene, or else a floor below its bodies.
+std::vector<Obstacle> drawn(const LiveScene& live, const Instance& rest, const Extent& extent,
+                            bool& floor) {
+  const RenderRequest& look = live.scene().render;
+  floor = live.model().obstacles.empty() && looks_down(look.view, look.up);
+  if (!floor) return live.model().obstacles;
+  Span height;
+  for (const auto* points : {&rest.surfels, &rest.phyxels}) {
+    for (const Vec3d& p : *points) height.include(dot(p, normalised(look.up)));
+  }
+  return {floor_below(look.up, extent.centre(), height.low - extent.radius / 2, 2 * extent.radius)};
+}
+
+/// The sliders that the scene has a use for, with their values.
+Json settings_of(const Scene& scene) {
+  Json settings;
+  settings["gravity"] = {scene.gravity.x, scene.gravity.y, scene.gravity.z};
+  const bool elastic = std::any_of(scene.bodies.begin(), scene.bodies.end(), [](const auto& body) {
+    return has_parameter(law_of(body, body.material), "young");
+  });
+  if (elastic) settings["stiffness"] = 1;
+  settings["damping"] = scene.bodies.empty() ? 0 : scene.bodies.front().material.damping;
+  if (scene.contact) {
+    settings["friction"] = scene.contact->friction;
+  } else if (!scene.obstacles.empty()) {
+    settings["friction"] = scene.obstacles.front().friction;
+  }
+  return settings;
+}
+
+/// The data that the page's script reads. Lengths are in units of the radius, about the centre.
+Json data_of(const LiveScene& live, const LivePicture& picture, const Extent& extent,
+             const std::vector<Obstacle>& obstacles, bool floor) {
+  Json data;
+  data["surfels"] = picture.surfels().size();
+  data["phyxels"] = picture.phyxels().size();
+  data["fields"] = Json::array();
+  for (const LiveField& field : picture.fields()) {
+    data["fields"].push_back({{"name", field.name}, {"unit", field.unit}});
+  }
+  data["opening"] = {{"frame", 0}, {"field", -1}};
+  data["radius"] = extent.radius;
+  const Vec3d centre = extent.centre();
+  data["centre"] = {centre.x, centre.y, centre.z};
+  for (const Span& side : extent.box) {
+    data["scale"].push_back(side.width() / Span::steps / extent.radius);
+    data["low"].push_back(-side.width() / 2 / extent.radius);
+  }
+  for (const Vec3d p : extent.outermost.points()) {
+    const Vec3d centred = (1 / extent.radius) * (p - centre);
+    data["outermost"].push_back({centred.x, centred.y, centred.z});
+  }
+  const double start[] = {0};
+  data["obstacles"] = obstacles_json(obstacles, RigidPaths(), start, extent);
+  data["only_floor"] = floor;
+  data["spacing"] = picture.spacing() / extent.radius;
+  data["carriers"] = Carriers::each;
+  const RenderRequest& look = live.scene().render;
+  const auto axes = upright_axes(look.up);
+  const auto along = [&](int axis) { return -dot(look.view, axes[axis]); };
+  data["view"] = {{"yaw", std::atan2(along(1), along(0))},
+                  {"pitch", std::atan2(along(2), std::hypot(along(0), along(1)))}};
+  for (const Vec3d axis : axes) data["axes"].push_back({axis.x, axis.y, axis.z});
+  data["settings"] = settings_of(live.scene());
+  data["step"] = live.solver().dt();
+  return data;
+}
+
+}  // namespace
+
+std::string live_page(const LiveScene& live, const LivePicture& picture, const std::string& about) {
+  Instance rest;
+  rest.surfels = picture.surfels();
+  rest.phyxels = picture.phyxels();
+  const Extent extent = extent_of({rest});
+  bool floor = false;
+  const std::vector<Obstacle> obstacles = drawn(live, rest, extent, floor);
+  std::string elements;
+  const auto embed = [&](const std::string& name, const auto& numbers) {
+    elements += fmt::format("<script type=\"application/octet-stream\" id=\"{}\">{}</script>\n",
+                            name, base64(std::as_bytes(std::span(numbers))));
+  };
+  embed("rest-phyxels", scaled(rest.phyxels, extent));
+  embed("phyxels-bodies", picture.phyxel_bodies());
+  embed("ids", picture.ids());
+  if (!rest.surfels.empty()) {
+    embed("rest-surfels", scaled(rest.surfels, extent));
+    embed("surfels-bodies", picture.surfel_bodies());
+    embed("triangles", picture.triangles());
+    embed("carriers", picture.carriers().phyxel);
+    embed("weights", picture.carriers().weight);
+  }
+  for (std::size_t k = 0; k < obstacles.size(); ++k) {
+    if (!obstacles[k].surface) continue;
+    embed(fmt::format("obstacle{}", k), scaled_vertices(*obstacles[k].surface, extent));
+    embed(fmt::format("obstacle{}-triangles", k), obstacles[k].surface->triangle);
+  }
+  std::string title = live.scene().title;
+  if (title.empty()) title = live.scene().file.stem().string();
+  const std::string summary = fmt::format("{} phyxels, {} surfels, {}", live.model().global_count(),
+                                          live.model().global_surfel_count(), about);
+  return filled_page("view.html",
+                     {{"title", html_text(title)},
+                      {"summary", html_text(summary)},
+                      {"elements", elements},
+                      {"data", script_json(data_of(live, picture, extent, obstacles, floor))},
+                      {"scene", html_text(live.scene().text)},
+                      {"footer", html_text(fmt::format("Simulated by {}.", program_version()))}});
+}
+
+}  // namespace phyxel::app

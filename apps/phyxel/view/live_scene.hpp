@@ -1,0 +1,85 @@
+/// A scene that runs while a user acts on it.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "phyxel/diagnostics.hpp"
+#include "phyxel/shared_model.hpp"
+#include "phyxel/solver.hpp"
+#include "phyxel/step_control.hpp"
+#include "setup.hpp"
+#include "view/hand.hpp"
+#include "view/request.hpp"
+
+namespace phyxel::app {
+
+/// A scene with changed values. Settings that it has nothing for leave it as it is.
+Scene with_settings(Scene scene, const Settings& settings);
+
+/// The model, backend and solver of a scene, and what acts have made of them. All functions but
+/// const ones are collective, and the same acts at the same steps give the same bits on any number
+/// of ranks.
+class LiveScene {
+ public:
+  /// @throws InputError for a search for equilibrium, which has no time; DeviceError
+  LiveScene(Scene scene, CutOptions cut, bool unsafe_step);
+  ~LiveScene();
+
+  /// Takes `count` steps. @throws DivergedError
+  void advance(std::int64_t count);
+  /// Takes an act, except `save`, into effect. An act that is refused changes nothing.
+  /// @throws InputError for a phyxel or a setting that the scene cannot have
+  void apply(const Request& act);
+  /// Finds energies and momenta, and checks the state. @throws DivergedError
+  const Diagnostics& look();
+
+  /// The scene with all settings.
+  const Scene& scene() const { return scene_; }
+  const SharedModel& shared() const;
+  const Model& model() const { return shared().here(); }
+  Backend& backend() const;
+  const Solver& solver() const;
+  /// The result of the last look.
+  const Diagnostics& now() const { return now_; }
+  /// Steps taken since the start, whatever became of their number by resets and changes of size.
+  std::int64_t taken() const { return taken_; }
+  /// The values that acts have set.
+  const Settings& settings() const { return settings_; }
+  /// True while the hand holds a body.
+  bool is_held() const { return hand_.has_value(); }
+  /// Work of the hand since the last reset, up to its last pull [J].
+  double hand_work() const { return worked_ + (hand_ ? hand_->work() : 0); }
+  /// Impulse of the hand since the last reset [N s].
+  Vec3d hand_impulse() const { return pushed_ + (hand_ ? hand_->impulse() : Vec3d{}); }
+
+ private:
+  struct Built;
+  std::unique_ptr<Built> built(const Scene& scene) const;
+  void begin(std::unique_ptr<Built> built, const State& state);
+  void set(const Settings& settings);
+  void let_go();
+  /// The present state for the next model, whose planned step it changes to one that fits the time.
+  State carried_over(Built& next) const;
+  /// Changes velocities by a share of what a model's next step of Verlet's method adds.
+  void move_velocities(Built& by, State& state, double share) const;
+  void refresh_ghosts(State& state) const;
+
+  const Scene given_;  // without settings
+  Scene scene_;
+  Settings settings_;
+  ChosenDevice device_;
+  CutOptions cut_;
+  bool unsafe_step_;
+  std::unique_ptr<Built> built_;
+  std::optional<Hand> hand_;
+  std::int64_t taken_ = 0;
+  double worked_ = 0;   // by the hand, before it grabbed what it holds [J]
+  Vec3d pushed_;        // likewise [N s]
+  bool acted_ = false;  // since the last look, so that energies may have changed
+  Diagnostics now_;
+};
+
+}  // namespace phyxel::app

@@ -1,0 +1,92 @@
+/// The loop of a live view: requests, steps, frames.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "setup.hpp"
+#include "stop_signal.hpp"
+#include "stopwatch.hpp"
+#include "view/live_picture.hpp"
+#include "view/live_scene.hpp"
+#include "view/recording.hpp"
+#include "view/server.hpp"
+
+namespace phyxel::app {
+
+struct ViewOptions {
+  Overrides overrides;
+  CutOptions cut;
+  std::string host = "127.0.0.1";
+  int port = 8080;
+  double pace = 1;        ///< Seconds simulated a second.
+  bool paused = false;    ///< True to wait for "play".
+  bool headless = false;  ///< True to replay a session without a page.
+  std::string replay;     ///< File of a session, or "".
+};
+
+/// A live view from its set-up to its end. All ranks step; the first one serves the page, decides
+/// what comes next and tells the others.
+class Session {
+ public:
+  explicit Session(const ViewOptions& options);
+  /// Runs until a signal comes or, without a page, the recording ends.
+  void run();
+
+ private:
+  /// What all ranks do next.
+  struct Turn {
+    std::vector<Request> acts;
+    std::int64_t steps = 0;
+    std::int32_t field = -1;  // of the frame
+    bool look = false, frame = false, end = false;
+  };
+  Turn decided();
+  Turn agreed(Turn turn) const;
+  void take(const Turn& turn);
+
+  // On the first rank:
+  void read_messages();
+  void obey(const Request& request);
+  void add_acts(Turn& turn);
+  std::int64_t steps_due();
+  void tell_state();
+  void tell(const std::string& message);
+  void tell_energies();
+
+  // On all ranks:
+  void act(const Request& request);
+  void save();
+  void diverged(const std::string& why);
+  std::filesystem::path next_folder() const;
+
+  const ViewOptions& options_;
+  StopSignal signals_;
+  LiveScene live_;
+  std::optional<LivePicture> picture_;
+  std::optional<ViewServer> server_;
+  Recording recording_;
+  std::deque<Recorded> to_replay_;
+  std::vector<Request> waiting_;  // acts of the page
+  bool playing_, broken_ = false;
+  double pace_;
+  std::int64_t asked_steps_ = 0;  // by the page, while the scene rests
+  std::int32_t field_ = -1;       // place of the shown field; -1: colours of bodies
+  std::uint32_t frames_ = 0;
+  std::size_t joins_ = 0;
+  std::int64_t shown_at_ = -1, looked_at_ = -1;  // steps taken at the last frame and look
+  bool changed_ = true;                          // since the last frame
+  double seconds_per_step_ = 0;
+  Clock::time_point last_frame_, last_look_, since_;  // since: of the pace
+  double since_time_ = 0;                             // simulated then [s]
+  double speed_time_ = 0;                             // simulated at the last look [s]
+  double look_pause_ = 0;                             // until the next look [s]
+};
+
+}  // namespace phyxel::app
