@@ -7,9 +7,7 @@
 
 #ifdef PHYXEL_HAVE_VIEW
 
-#include <boost/asio.hpp>
-#include <boost/beast.hpp>
-#include <utility>  // before Boost.Asio 1.74, which uses std::exchange without it
+#include "view/beast.hpp"
 
 namespace phyxel::app {
 namespace {

@@ -6,15 +6,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <boost/asio.hpp>
-#include <boost/beast.hpp>
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <string>
-#include <utility>  // before Boost.Asio 1.74, which uses std::exchange without it
 
 #include "support/folder.hpp"
+#include "view/beast.hpp"
 
 namespace phyxel::test {
 

@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <boost/asio.hpp>
-#include <boost/beast.hpp>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
@@ -14,10 +12,10 @@
 #include <set>
 #include <string_view>
 #include <thread>
-#include <utility>  // before Boost.Asio 1.74, which uses std::exchange without it
 #include <utility>
 
 #include "phyxel/error.hpp"
+#include "view/beast.hpp"
 
 namespace phyxel::app {
 namespace {

@@ -1,5 +1,4 @@
-/// Bodies that break: what a crack takes, what breaking keeps, and what it costs where nothing
-/// breaks.
+/// Bodies that break: what a crack takes, what breaking keeps, and what whole bodies pay.
 #include "model/fracture.hpp"
 
 #include <gmock/gmock.h>
@@ -473,7 +472,8 @@ TEST(Fracture, IsRefusedWhereItCannotBe) {
               HasSubstr("body.neighbours.factor = 3; allowed: 1.54 to 1.89"));
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.hourglass = 0; }),
               HasSubstr("body.material.hourglass = 0"));
-  EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.viscosity = 1e-3; }), HasSubstr("viscosity"));
+  EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.viscosity = 1e-3; }),
+              HasSubstr("viscosity"));
   EXPECT_THAT(refusal([](Scene&, Body& b) { b.material.volume_stiffness = 10; }),
               HasSubstr("volume_stiffness = 10"));
   EXPECT_THAT(refusal([](Scene&, Body& b) {
