@@ -289,7 +289,7 @@ void Session::act(const Request& request) {
 
 fs::path Session::next_folder() const {
   for (int k = 1;; ++k) {
-    const fs::path folder = live_.scene().output.directory / fmt::format("saved_{:04}", k);
+    fs::path folder = live_.scene().output.directory / fmt::format("saved_{:04}", k);
     std::error_code error;
     fs::create_directories(folder.parent_path(), error);
     if (fs::create_directory(folder, error)) return folder;
