@@ -74,14 +74,14 @@ TEST(Hand, GivesTheBodyItsWorkAndItsImpulse) {
 }
 
 TEST(Hand, BringsWhatItHoldsToItsPlace) {
-  LiveScene live = block({}, "damping = 20\n");
+  // The hand damps the body itself: it has hardly any damping of its own.
+  LiveScene live = block({}, "damping = 0.5\n");
   live.apply(grab(3));
   const Vec3d by{0.05, -0.02, 0.1};
   live.apply(move(by));
   live.advance(static_cast<std::int64_t>(2 / live.solver().dt()));
   const Vec3d at = live.solver().state().displacement[3];
-  EXPECT_LT(norm(at - by), 0.1 * norm(by));  // it turns about the middle of the patch
-  EXPECT_LT(live.look().largest_speed, 1e-2);
+  EXPECT_LT(norm(at - by), 0.15 * norm(by));  // it turns and rings about the middle of the patch
 }
 
 TEST(Hand, NeverHurtsTheStep) {
@@ -180,13 +180,19 @@ TEST(LiveScene, BeginsAnewAsItBegan) {
   live.apply(grab(5));
   live.apply(move({1, 0, 0}));
   live.advance(100);
+  live.apply({RequestKind::drop});
+  EXPECT_GT(live.hand_work(), 0);
+  live.apply(grab(5));
+  live.apply(move({0, 1, 0}));
+  live.advance(20);
   live.apply({RequestKind::reset});
   EXPECT_EQ(live.solver().time(), 0);
   EXPECT_EQ(live.solver().state().velocity, start.velocity);
   EXPECT_EQ(live.solver().state().displacement, start.displacement);
   EXPECT_EQ(live.hand_work(), 0);
   EXPECT_FALSE(live.is_held());
-  EXPECT_EQ(live.taken(), 200);
+  EXPECT_EQ(norm(live.hand_impulse()), 0);
+  EXPECT_EQ(live.taken(), 220);
 }
 
 TEST(LiveScene, RefusesASearchForRest) {
