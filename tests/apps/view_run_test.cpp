@@ -182,6 +182,18 @@ TEST_F(ViewInABrowser, ObeysItsControls) {
   EXPECT_TRUE(browser_->comes_true("!playing"));
   click("restart");
   EXPECT_TRUE(browser_->comes_true("latest.time === 0"));
+  // The picture moves with the bodies, and comes back with them.
+  const auto picture = [&] { return browser_->value("draw(), canvas.toDataURL()"); };
+  const test::Browser::Json at_rest = picture();
+  EXPECT_EQ(picture(), at_rest);
+  click("play");
+  EXPECT_TRUE(browser_->comes_true("latest.time > 0.1"));
+  click("play");
+  EXPECT_TRUE(browser_->comes_true("!playing"));
+  EXPECT_NE(picture(), at_rest);
+  click("restart");
+  EXPECT_TRUE(browser_->comes_true("latest.time === 0"));
+  EXPECT_EQ(picture(), at_rest);
   const Outcome outcome = end_view();
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   const app::Recording saved =

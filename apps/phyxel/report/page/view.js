@@ -259,7 +259,7 @@ function receive(frame) {
     range = frame.field === range.field ? {field: frame.field, low: Math.min(low, slow(range.low, low)), high: Math.max(high, slow(range.high, high))} : {field: frame.field, low, high};
   }
   if (document.getElementById('follow').checked && !hand) {
-    const share = latest ? lag : 1;
+    const share = latest && frame.time >= latest.time ? lag : 1;
     followed = followed.map((x, k) => x + share * (frame.middle[k] / data.radius - x));
     farther += share * (Math.min(mostFarther, 1 + 0.8 * Math.max(...frame.half) / data.radius) - farther);
   }
