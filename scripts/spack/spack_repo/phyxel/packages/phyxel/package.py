@@ -25,10 +25,12 @@ class Phyxel(CMakePackage, CudaPackage):
 
     variant("mpi", default=True, description="Bodies shared by MPI ranks")
     variant("parallel_hdf5", default=False, description="Ranks write long arrays collectively")
+    variant("view", default=True, description="Live views in a browser (phyxel view)")
     variant("shared", default=True, description="Shared libraries")
 
     depends_on("c", type="build")
     depends_on("cxx", type="build")
+    depends_on("boost@1.74:", type="build", when="+view")
     depends_on("cmake@3.25:", type="build")
     depends_on("cli11", type="build")
     depends_on("eigen@3.4:3", type="build")
@@ -54,6 +56,7 @@ class Phyxel(CMakePackage, CudaPackage):
             self.define_from_variant("PHYXEL_MPI", "mpi"),
             self.define_from_variant("PHYXEL_CUDA", "cuda"),
             self.define_from_variant("PHYXEL_PARALLEL_HDF5", "parallel_hdf5"),
+            self.define_from_variant("PHYXEL_VIEW", "view"),
             self.define_from_variant("BUILD_SHARED_LIBS", "shared"),
             self.define("PHYXEL_TESTS", False),
             self.define("PHYXEL_PYTHON", "OFF"),  # pip's
