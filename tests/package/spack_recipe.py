@@ -70,7 +70,7 @@ cmake = "".join(
 for option, _ in phyxel().cmake_args():
     assert re.search(rf"\b{option}\b", cmake), f"{option}: read by no CMake file"
 variants = {args[0] for args, _ in said["variant"]}
-assert {"mpi", "parallel_hdf5", "shared"} == variants, variants
+assert {"mpi", "parallel_hdf5", "shared", "view"} == variants, variants
 
 needed = " ".join(args[0] for args, _ in said["depends_on"])
 least = re.search(r"cmake_minimum_required\(VERSION ([\d.]+)\)", cmake)[1]
