@@ -24,8 +24,8 @@ using Json = nlohmann::ordered_json;
 
 /// Time of a turn, after which requests are read again [s]; times between frames and between looks.
 constexpr double turn_seconds = 0.012, frame_seconds = 1.0 / 60, look_seconds = 0.1;
-/// Largest share of the time that looks at energies take.
-constexpr double look_share = 0.1;
+/// Largest share of the time that looks at energies take, and that frames do.
+constexpr double look_share = 0.1, frame_share = 0.2;
 /// Largest size of a recorded session [bytes].
 constexpr std::size_t most_of_session = std::size_t{1} << 28;
 
@@ -144,7 +144,7 @@ Session::Turn Session::decided() {
   if (!server_) return turn;
   const bool news = changed_ || live_.taken() + turn.steps != shown_at_ || !turn.acts.empty();
   turn.field = field_;
-  turn.frame = news && server_->wants_frame() && seconds_since(last_frame_) > frame_seconds;
+  turn.frame = news && server_->wants_frame() && seconds_since(last_frame_) > frame_pause_;
   turn.look = live_.taken() + turn.steps != looked_at_ && seconds_since(last_look_) > look_pause_;
   if (turn.steps == 0 && turn.acts.empty() && !turn.frame) {
     server_->wait_for_message(std::chrono::milliseconds(4));
@@ -253,11 +253,15 @@ void Session::take(const Turn& turn) {
     last_look_ = Clock::now();
   }
   if (turn.frame) {
+    const auto start = Clock::now();
     const auto frame = picture_->frame(live_, turn.field, ++frames_);
     if (server_) server_->send_frame(frame);
     shown_at_ = live_.taken();
     changed_ = false;
     last_frame_ = Clock::now();
+    // What rests has time for frames.
+    const double share = turn.steps > 0 ? frame_share : 1;
+    frame_pause_ = std::max(frame_seconds, seconds_since(start) * (1 / share - 1));
   }
 }
 

@@ -86,7 +86,7 @@ class Session {
   Clock::time_point last_frame_, last_look_, since_;  // since: of the pace
   double since_time_ = 0;                             // simulated then [s]
   double speed_time_ = 0;                             // simulated at the last look [s]
-  double look_pause_ = 0;                             // until the next look [s]
+  double look_pause_ = 0, frame_pause_ = 0;           // until the next ones [s]
 };
 
 }  // namespace phyxel::app
