@@ -258,17 +258,18 @@ TEST(BodyContacts, AreOfSomePairsAloneIfAsked) {
 TEST(BodyContacts, HoldAStack) {
   std::string text = "gravity = [0, 0, -9.81]\n" + end + "[contact]\nfriction = 0.5\nsweeps = 4\n" +
                      obstacle("shape = 'plane'\nfriction = 0.5\ntranslation = [0, 0, -0.1]\n");
-  constexpr int blocks = 4;
+  constexpr int blocks = 10;
   for (int k = 0; k < blocks; ++k) {
     text += body(fmt::format("block {}", k),
-                 "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.05\nlattice = 'nodes'\n",
+                 "shape = 'block'\nsize = [0.2, 0.2, 0.2]\nspacing = 0.1\nlattice = 'nodes'\n",
                  fmt::format("translation = [{}, {}, {}]\nrotation = [0, 0, {}]\n", 0.003 * k,
                              -0.002 * k, 0.2 * k, 7 * k),
-                 1e6) +  // softer ones buckle under their weight
-            "damping = 12\n";
+                 1e7) +  // softer ones buckle under their weight
+            "damping = 6\n";
   }
-  Way way(text, 2e-4);
-  way.solver.step(7000);
+  Way way(text, 4e-4);
+  // The tower leans and comes back at 3.3 rad/s, which is damped critically.
+  way.solver.step(6500);
   const Vec3d before = way.centre();
   double force = 0;
   for (int k = 0; k < 1000; ++k) {
@@ -276,10 +277,10 @@ TEST(BodyContacts, HoldAStack) {
     if (k % 10 == 0) force += way.contacts()[0].force.z / 100;
   }
   EXPECT_NEAR(force / (9.81 * way.mass()), 1, 1e-3);
-  EXPECT_LE(norm(way.centre() - before), 1e-3 * 0.05);
+  EXPECT_LE(norm(way.centre() - before), 1e-3 * 0.1);
   double deepest = 0;
   for (const ContactReading& c : way.contacts()) deepest = std::max(deepest, c.depth);
-  EXPECT_LE(deepest, 0.2 * 0.05);
+  EXPECT_LE(deepest, 0.2 * 0.1);
 }
 
 TEST(BodyContacts, HaveTheSameBitsOnAnyThreadsAndAfterARestart) {
