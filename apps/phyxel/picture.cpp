@@ -1,55 +1,22 @@
 #include "picture.hpp"
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "drawn_obstacles.hpp"
+#include "field_colours.hpp"
 #include "files/atomic_file.hpp"
+#include "frame_scene.hpp"
 #include "phyxel/error.hpp"
 #include "png_file.hpp"
-#include "sort_unique.hpp"
-#include "terminal.hpp"
 
 namespace phyxel::app {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// The text of the scene in a frame; empty if there is none.
-std::string scene_text(const fs::path& file) {
-  try {
-    return read_frame(file, true).scene;
-  } catch (const InputError&) {
-    return {};
-  }
-}
-
-/// The wishes for pictures in a scene's text; the defaults if it cannot be parsed.
-RenderRequest wishes_in(const std::string& scene, const fs::path& file) {
-  try {
-    return parse_render(scene, file);
-  } catch (const InputError&) {
-    return {};  // the frame has no scene text, or one of another version
-  }
-}
-
-/// The obstacles of a scene; a warning names those whose meshes are gone.
-std::vector<Obstacle> obstacles_in(const std::string& scene, const fs::path& folder) {
-  DrawnObstacles drawn =
-      drawn_obstacles(scene, folder / "scene.toml", [](const fs::path& mesh) -> std::string {
-        if (fs::exists(mesh)) return "";
-        return fmt::format("there is no {}; --scene-folder names the scene's folder",
-                           mesh.string());
-      });
-  for (const std::string& line : drawn.left_out) {
-    fmt::print(stderr, "phyxel: {}{}\n", warning_word(), line);
-  }
-  return std::move(drawn.obstacles);
-}
 
 /// Fits the camera to all frames, so that it sees the whole motion.
 Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request) {
@@ -58,8 +25,8 @@ Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request)
   const Shot& first = shots.front();
   const fs::path& start = first.surface.empty() ? first.phyxels : first.surface;
   const std::string scene = scene_text(start);
-  const RenderRequest asked = wishes_in(scene, start);
-  setting.obstacles = obstacles_in(scene, request.scene_folder);
+  const RenderRequest asked = render_request_of(scene, start);
+  setting.obstacles = obstacles_of_frames(scene, request.scene_folder);
   setting.paths = RigidPaths(start.parent_path());
   setting.up = request.up.value_or(asked.up);
   // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
@@ -117,51 +84,6 @@ std::vector<Vec3d> some_points(const std::vector<Shot>& shots) {
   return points;
 }
 
-/// The colours that show a field of the frames.
-/// @throws InputError if the frames lack it
-Colouring colouring_of(const std::vector<Shot>& shots, const std::vector<std::size_t>& chosen,
-                       const PictureRequest& request, double spacing) {
-  Colouring colouring{.field = request.colour};
-  const auto surface = read_if_any(shots.front().surface, true),
-             phyxels = read_if_any(shots.front().phyxels, true);
-  if (surface && phyxels && !surface->point.empty() && !phyxels->point.empty()) {
-    colouring.carriers =
-        carriers_of(surface->point, phyxels->point, spacing > 0 ? 1.6 * spacing : 1);
-  }
-  const auto shown = [&](const std::optional<FrameData>& a, const std::optional<FrameData>& b) {
-    return shown_values(a ? &*a : nullptr, b ? &*b : nullptr, colouring);
-  };
-  if (shown(surface, phyxels).empty()) {
-    std::vector<std::string> names;
-    for (const auto& frame : {surface, phyxels}) {
-      if (!frame) continue;
-      for (const std::string& name : colour_fields(*frame)) names.push_back(name);
-    }
-    sort_unique(names);
-    throw InputError(fmt::format(
-        "--colour {}: the frames have no such number or vector; allowed: {}; "
-        "output.fields of the scene adds others",
-        request.colour, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
-  }
-  if (request.range) {
-    const auto [low, high] = *request.range;
-    colouring.range = {low, high, request.scale == Scale::logarithmic};
-    return colouring;
-  }
-  constexpr std::size_t most = 1'000'000;  // values of a sample
-  std::vector<double> sample;
-  for (const std::size_t k : chosen) {
-    const std::vector<double> values =
-        shown(read_if_any(shots[k].surface, true), read_if_any(shots[k].phyxels, true));
-    const std::size_t every = 1 + values.size() * chosen.size() / most;
-    for (std::size_t i = 0; i < values.size(); i += every) {
-      if (std::isfinite(values[i])) sample.push_back(values[i]);
-    }
-  }
-  colouring.range = colour_range(std::move(sample), request.scale);
-  return colouring;
-}
-
 /// The setting of some pictures, with a camera of each.
 class Stage {
  public:
@@ -170,7 +92,8 @@ class Stage {
         const PictureRequest& request)
       : shots_(shots), setting_(set_stage(shots, request)) {
     if (!request.colour.empty()) {
-      setting_.colouring = colouring_of(shots, chosen, request, setting_.spacing);
+      setting_.colouring = field_colours(
+          shots, chosen, {request.colour, request.range, request.scale}, setting_.spacing);
     }
     if (request.orbit == 0) return;
     cameras_ = orbit(setting_.camera, setting_.up, setting_.middle, some_points(shots),

@@ -1,6 +1,5 @@
 /// phyxel render: pictures and videos of a trajectory.
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <CLI/CLI.hpp>
 #include <cmath>
@@ -10,18 +9,17 @@
 #include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "picture.hpp"
+#include "trajectory_options.hpp"
 
 namespace phyxel::app {
 namespace {
-
-constexpr std::int64_t most_frames = 1'000'000'000;
 
 struct RenderOptions {
   std::filesystem::path input, out;
   VideoRequest video;
   PictureRequest request;
-  std::vector<double> view, up, range;
-  std::string scale = "auto";
+  std::vector<double> view, up;
+  ColourOptions colours;
   bool no_phyxels = false, no_surface = false, no_floor = false, force = false, json = false;
 };
 
@@ -50,21 +48,10 @@ void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
   request.view = vector_of(options.view, "--view");
   request.up = vector_of(options.up, "--up");
-  if (options.scale == "linear") request.scale = Scale::linear;
-  if (options.scale == "log") request.scale = Scale::logarithmic;
-  if (!options.range.empty()) {
-    if (options.range.size() != 2 || !(options.range[0] < options.range[1])) {
-      throw InputError(
-          fmt::format("--range {}: allowed: two numbers, the lower one first, as in "
-                      "--range 0,5e4",
-                      fmt::join(options.range, ",")));
-    }
-    request.range = {options.range[0], options.range[1]};
-    if (request.scale == Scale::logarithmic && !(options.range[0] > 0)) {
-      throw InputError(fmt::format("--range {} with --scale log: allowed: positive numbers",
-                                   fmt::join(options.range, ",")));
-    }
-  }
+  const ColourRequest colours = options.colours.request();
+  request.colour = colours.field;
+  request.range = colours.range;
+  request.scale = colours.scale;
   if (!std::isfinite(request.orbit)) {
     throw InputError(fmt::format("--orbit {}: allowed: a finite angle in degrees", request.orbit));
   }
@@ -91,27 +78,6 @@ void render_command(const RenderOptions& options) {
              files.front().string());
   fmt::print("{}{}\n", files.size() > 1 ? " ... " : "",
              files.size() > 1 ? files.back().string() : std::string());
-}
-
-void add_colour_options(CLI::App& command, RenderOptions& options) {
-  auto* colour = command.add_option(
-      "--colour,--color", options.request.colour,
-      "Field of the frames that colours show, with a bar: displacement, speed, von_mises, ...");
-  command
-      .add_option(
-          "--range", options.range,
-          "Range of the colours: low,high (default: that of 98% of the values of the pictures, "
-          "or of 94% on a logarithmic scale)")
-      ->delimiter(',')
-      ->allow_extra_args(false)
-      ->needs(colour);
-  command
-      .add_option("--scale", options.scale,
-                  "Scale of the colours: auto (logarithmic if most values crowd at the low end), "
-                  "linear or log")
-      ->check(CLI::IsMember({"auto", "linear", "log"}))
-      ->capture_default_str()
-      ->needs(colour);
 }
 
 /// @param out the option of the folder of pictures, which a video excludes
@@ -146,20 +112,7 @@ void add_render(CLI::App& program) {
       ->required();
   auto* out = command->add_option("--out", options->out,
                                   "Folder for the pictures (default: pictures/ beside the frames)");
-  auto* frames = command
-                     ->add_option("--frames", request.choice.frames,
-                                  "Frames, comma separated, from 0; -1 is the last (default: all)")
-                     ->delimiter(',')
-                     ->allow_extra_args(false);
-  auto* count = command
-                    ->add_option("--count", request.choice.count,
-                                 "Number of frames, evenly spaced, first and last included")
-                    ->check(CLI::Range(std::int64_t{1}, most_frames))
-                    ->excludes(frames);
-  command->add_option("--every", request.choice.every, "Interval of frames: 10 draws every tenth")
-      ->check(CLI::Range(std::int64_t{1}, most_frames))
-      ->excludes(frames)
-      ->excludes(count);
+  add_frame_options(*command, request.choice);
   command->add_option("--width", request.width, "Width [px]")->capture_default_str();
   command->add_option("--height", request.height, "Height [px]")->capture_default_str();
   command
@@ -171,7 +124,7 @@ void add_render(CLI::App& program) {
                    "Vertical direction of the picture: x,y,z (default: the scene's)")
       ->delimiter(',')
       ->allow_extra_args(false);
-  add_colour_options(*command, *options);
+  add_colour_options(*command, options->colours);
   add_video_options(*command, *options, out);
   command->add_option("--scene-folder", request.scene_folder,
                       "Folder of the scene, with the meshes of its obstacles (default: the current "

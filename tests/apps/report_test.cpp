@@ -8,6 +8,7 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
+#include "base64.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/recorder.hpp"
 #include "report/page.hpp"

@@ -1,7 +1,6 @@
 /// Self-contained pages: HTML with its style, script and data in one file.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <span>
@@ -21,8 +20,6 @@ std::string filled_page(std::string_view name, const Fillings& fillings);
 std::string html_text(std::string_view text);
 /// JSON for a script element of a page.
 std::string script_json(const nlohmann::ordered_json& json);
-/// Base64 encoding by RFC 4648.
-std::string base64(std::span<const std::byte> bytes);
 
 /// A paragraph for each warning.
 std::string html_warnings(std::span<const std::string> warnings);

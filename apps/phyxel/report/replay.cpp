@@ -6,6 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "base64.hpp"
 #include "compose.hpp"
 #include "phyxel/error.hpp"
 #include "report/page.hpp"
