@@ -19,7 +19,7 @@ build=(g++ cmake ninja-build git libeigen3-dev libtomlplusplus-dev libcli11-dev 
 # beside which phyxel is measured.
 tests=(ccache pkg-config clang-format clang-tidy doxygen libgtest-dev libgmock-dev clang libclang-rt-dev libomp-dev lld llvm
        python3-h5py python3-vtk9 python3-dev pybind11-dev python3-numpy python3-pytest
-       python3-matplotlib python3-pandas chromium fish zsh libhdf5-openmpi-dev calculix-ccx)
+       python3-matplotlib python3-pandas python3-meshio chromium fish zsh libhdf5-openmpi-dev calculix-ccx)
 
 wanted=("${build[@]}")
 if [[ ${1-} == --tests ]]; then

@@ -54,7 +54,7 @@ missing_tools() {
   for tool in ccx chromium doxygen dpkg-shlibdeps ffmpeg fish gnuplot help2man mpirun pkg-config zsh; do
     command -v "$tool" >/dev/null || echo "$tool"
   done
-  for module in h5py matplotlib numpy pandas pytest vtkmodules; do
+  for module in h5py matplotlib meshio numpy pandas pytest vtkmodules; do
     python3 -c "import $module" 2>/dev/null || /usr/bin/python3 -c "import $module" 2>/dev/null || echo "Python's $module"
   done
 }

@@ -17,9 +17,6 @@ std::size_t components(const FrameData& frame, const std::vector<double>& values
   return points > 0 && values.size() % points == 0 ? values.size() / points : 0;
 }
 
-/// The name of a field in frames.
-std::string stored_name(const std::string& field) { return field == "speed" ? "velocity" : field; }
-
 /// The unit of a field; "" of a number without one.
 std::string unit_of(const std::string& field) {
   struct Unit {
@@ -76,6 +73,13 @@ void draw_ticks(Image& image, const ColourRange& range, const BarEdge& bar) {
 }
 
 }  // namespace
+
+std::string stored_name(const std::string& field) { return field == "speed" ? "velocity" : field; }
+
+std::string field_title(const std::string& field) {
+  const std::string unit = unit_of(field);
+  return unit.empty() ? field : fmt::format("{} [{}]", field, unit);
+}
 
 std::vector<std::string> colour_fields(const FrameData& frame) {
   std::vector<std::string> names;
@@ -145,9 +149,7 @@ void draw_colour_bar(Image& image, const Colouring& colouring) {
       }
     }
   }
-  const std::string unit = unit_of(colouring.field);
-  draw_text(image, left, top - line, scale,
-            unit.empty() ? colouring.field : fmt::format("{} [{}]", colouring.field, unit));
+  draw_text(image, left, top - line, scale, field_title(colouring.field));
   draw_ticks(image, colouring.range, {left, top + height, width, scale});
 }
 

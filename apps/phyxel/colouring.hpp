@@ -24,6 +24,12 @@ struct Colouring {
 /// shown; "speed" is that of the velocity.
 std::vector<std::string> colour_fields(const FrameData& frame);
 
+/// The name by which frames store a field that colours show.
+std::string stored_name(const std::string& field);
+
+/// A field's name with its unit.
+std::string field_title(const std::string& field);
+
 /// A field's value at each point of a frame; unset if the frame lacks it.
 std::optional<std::vector<double>> field_values(const FrameData& frame, const std::string& field);
 

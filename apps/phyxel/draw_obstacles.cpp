@@ -6,8 +6,6 @@
 namespace phyxel::app {
 namespace {
 
-const Colour solid_colour = oklch(0.70, 0.018, 75), plane_colour = oklch(0.86, 0.008, 75);
-
 constexpr int largest_facet = 4;  // [px]
 
 /// An obstacle that some rays may meet.
@@ -162,8 +160,8 @@ class Painter {
   Colour colour(const Facet& facet, Vec3d normal, float light) const {
     const Vec3d seen{dot(normal, camera_.right), dot(normal, camera_.up),
                      -dot(normal, camera_.forward)};
-    const bool bounded = obstacles_[facet.obstacle].bounded;
-    return rasteriser_.lit(bounded ? solid_colour : plane_colour, to<float>(seen), light);
+    const Colour own = obstacle_colour(obstacles_[facet.obstacle].bounded);
+    return rasteriser_.lit(own, to<float>(seen), light);
   }
 
   Rasteriser& rasteriser_;
@@ -179,6 +177,11 @@ class Painter {
 };
 
 }  // namespace
+
+Colour obstacle_colour(bool bounded) {
+  static const Colour solid = oklch(0.70, 0.018, 75), plane = oklch(0.86, 0.008, 75);
+  return bounded ? solid : plane;
+}
 
 float Fade::opacity(Vec3d place) const {
   const double t = std::clamp((end - norm(place - middle)) / (end - begin), 0.0, 1.0);

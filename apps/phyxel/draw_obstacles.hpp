@@ -18,6 +18,9 @@ struct Fade {
   float opacity(Vec3d place) const;
 };
 
+/// The colour of an obstacle. @param bounded false for a plane
+Colour obstacle_colour(bool bounded);
+
 /// The number by which the samples of an obstacle are told from those of bodies.
 inline Index body_of_obstacle(Index number) { return -2 - number; }
 

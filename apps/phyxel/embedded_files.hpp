@@ -13,6 +13,8 @@ struct EmbeddedFile {
 
 /// The files of report/page, of which `phyxel report` makes its page.
 std::span<const EmbeddedFile> page_files();
+/// The scripts of export/, of which `phyxel export` makes those of a run.
+std::span<const EmbeddedFile> export_files();
 /// The files of examples/, e.g. "dino/scene.toml", sorted by name.
 std::span<const EmbeddedFile> example_files();
 

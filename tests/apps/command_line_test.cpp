@@ -43,9 +43,7 @@ TEST_F(CommandLine, UnknownCommandsAndOptionsAreAnsweredWithTheNearest) {
       {{"run", "x.toml", "--Until", "1"}, "--Until", "did you mean \"--until\""},
       {{"run", "x.toml", "-o", "a"}, "-o", "did you mean \"--out\""},
       {{"run", "x.toml", "--forse"}, "--forse", "did you mean \"--force\""},
-      {{"run", "x.toml", "--max-megabytes", "9"},
-       "--max-megabytes",
-       "\"phyxel report\" has --max-megabytes"},
+      {{"run", "x.toml", "--orbit", "9"}, "--orbit", "\"phyxel render\" has --orbit"},
       {{"run", "x.toml", "y.toml"}, "y.toml", "one argument too many"},
   };
   for (const auto& c : cases) {
@@ -103,6 +101,11 @@ TEST_F(CommandLine, FilesOfAnotherKindAreToldApart) {
        {"x.h5", "x.hdf.series", "out"},
        "a run's folder, a series (.series), an HDF5"},
       {{"export"}, {"--single", "one.hdf"}, {"x.hdf.series"}, "a series (.series)"},
+      {{"export"},
+       {"--format", "glb"},
+       {"x.hdf.series", "out"},
+       "a run's folder, a series (.series)"},
+      {{"export"}, {"--format", "paraview"}, {"out"}, "a run's folder"},
       {{"report"},
        {"--out", "r.html"},
        {"x.h5", "x.hdf.series", "out"},
