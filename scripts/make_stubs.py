@@ -35,7 +35,7 @@ PARAMETERS = {"mesh": "Mesh", "progress": "Progress", "surface": "tuple[ArrayLik
 RESULTS = {"regions": "dict[str, NDArray[Any]]", "fields": "dict[str, NDArray[Any]]", "history": "dict[str, NDArray[Any]]",
            "at": "dict[str, NDArray[Any]]", "probes": "dict[str, dict[str, NDArray[Any]]]", "memory": "dict[str, int]",
            "surface": "tuple[NDArray[Any], NDArray[Any]]", "neighbours": "tuple[NDArray[Any], NDArray[Any]]",
-           "read_mesh": "tuple[NDArray[Any], NDArray[Any]]"}
+           "read_mesh": "tuple[NDArray[Any], NDArray[Any]]", "body_colour": "tuple[float, float, float]"}
 
 
 def plain_type(text):

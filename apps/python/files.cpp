@@ -1,5 +1,6 @@
 /// Trajectories on disk.
 #include "arrays.hpp"
+#include "colour.hpp"
 #include "phyxel/recorder.hpp"
 
 namespace phyxel::python {
@@ -27,18 +28,25 @@ void add_files(py::module_& module) {
             const auto n = static_cast<py::ssize_t>(frame.point.size());
             py::dict fields;
             for (const auto& [name, values] : frame.field) {
-              const bool scalar = values.size() == frame.point.size();
+              const auto width = n > 0 ? static_cast<py::ssize_t>(values.size()) / n : 0;
               fields[py::str(name)] =
-                  view(values.data(), scalar ? Shape{n} : Shape{n, 3}, py::handle(self));
+                  view(values.data(), width == 1 ? Shape{n} : Shape{n, width}, py::handle(self));
             }
             return fields;
           },
-          "Fields of the scene's output.fields: {name: array}, (n,) or (n, 3).")
+          "Fields of the scene's output.fields: {name: array}, (n,), (n, 3) or (n, 6).")
       .def("__len__", [](const FrameData& frame) { return frame.point.size(); })
       .def("__repr__", [](const FrameData& frame) {
         return fmt::format("<phyxel.Frame: t = {:g} s, {} points, {} triangles>", frame.time,
                            frame.point.size(), frame.triangle.size());
       });
+  module.def(
+      "body_colour",
+      [](Index body) {
+        const app::Colour colour = app::body_colour(body);
+        return py::make_tuple(colour.x, colour.y, colour.z);
+      },
+      "body"_a, "The colour of a body in pictures: red, green and blue of linear light, 0 to 1.");
   module.def(
       "read_frame",
       [](const std::filesystem::path& file) {

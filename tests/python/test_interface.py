@@ -137,3 +137,12 @@ def test_tables_without_pandas_say_what_is_missing(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="pip install pandas, or the arrays of trajectory.energy"):
         trajectory.table("energy")
+
+
+def test_tensors_of_frames_have_six_components(tmp_path):
+    scene = {**SCENE, "output": {"frames_per_second": 500, "fields": ["stress", "von_mises"]}}
+    frame = phyxel.run(scene, tmp_path / "run", clouds={"beam": BEAM}).phyxels[-1]
+    xx, yy, zz, xy, yz, xz = frame.fields["stress"].T
+    von_mises = np.sqrt(0.5 * ((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) + 3 * (xy**2 + yz**2 + xz**2))
+    assert von_mises.max() > 0
+    assert frame.fields["von_mises"] == pytest.approx(von_mises, rel=1e-5, abs=1e-6 * von_mises.max())

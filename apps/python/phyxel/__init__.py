@@ -50,7 +50,7 @@ from ._view import View, view
 __version__ = version.split()[1]
 __all__ = ["Cloud", "DeviceError", "DivergedError", "Error", "Frame", "InputError", "Live",
            "OutputError", "Simulation", "Trajectory", "View", "inspect", "read_body", "read_frame",
-           "read_mesh", "run", "sample", "shape", "to_toml", "version", "view"]
+           "read_mesh", "run", "sample", "shape", "to_toml", "to_usd", "version", "view"]
 
 
 def _text(text):
@@ -276,3 +276,6 @@ class Trajectory:
 
     def __repr__(self):
         return f"<phyxel.Trajectory: {self.directory}, {len(self)} frames>"
+
+
+from .usd import to_usd  # noqa: E402, which needs Trajectory

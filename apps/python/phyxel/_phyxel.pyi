@@ -75,7 +75,7 @@ class Frame:
         """Index of the body of each point, (n,); empty if there is one body."""
     @property
     def fields(self) -> dict[str, NDArray[Any]]:
-        """Fields of the scene's output.fields: {name: array}, (n,) or (n, 3)."""
+        """Fields of the scene's output.fields: {name: array}, (n,), (n, 3) or (n, 6)."""
     def __len__(self) -> int: ...
 
 class Live:
@@ -210,6 +210,9 @@ class SimulationBase:
     def memory(self) -> dict[str, int]:
         """Bytes the device holds: {array: bytes}."""
     def __len__(self) -> int: ...
+
+def body_colour(body: int) -> tuple[float, float, float]:
+    """The colour of a body in pictures: red, green and blue of linear light, 0 to 1."""
 
 def inspect(mesh: Mesh) -> str:
     """Describes the defects of a surface in one line."""
