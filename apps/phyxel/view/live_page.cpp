@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "base64.hpp"
 #include "drawn_obstacles.hpp"
 #include "phyxel/law_table.hpp"
 #include "report/page.hpp"
