@@ -6,6 +6,7 @@
 #include "arrays.hpp"
 #include "files/frame_file.hpp"
 #include "phyxel/contacts.hpp"
+#include "phyxel/fragments.hpp"
 #include "phyxel/gases.hpp"
 #include "phyxel/probes.hpp"
 #include "phyxel/state.hpp"
@@ -86,6 +87,25 @@ inline py::list dicts_of(const std::vector<RigidReading>& bodies) {
     values["velocity"] = body.velocity;
     values["spin"] = body.spin;
     values["kinetic_energy"] = body.kinetic_energy;
+    list.append(values);
+  }
+  return list;
+}
+
+/// Returns a dict of each fragment.
+inline py::list dicts_of(const std::vector<FragmentReading>& fragments) {
+  py::list list;
+  for (const FragmentReading& fragment : fragments) {
+    py::dict values;
+    values["body"] = fragment.body;
+    values["fragment"] = fragment.number;
+    values["first_phyxel"] = fragment.first;
+    values["phyxels"] = fragment.phyxels;
+    values["mass"] = fragment.mass;
+    values["centre"] = fragment.centre;
+    values["velocity"] = fragment.velocity;
+    values["angular_momentum"] = fragment.angular_momentum;
+    values["spin"] = fragment.spin;
     list.append(values);
   }
   return list;

@@ -76,6 +76,15 @@ void add_simulation(py::module_& module) {
           "obstacle, place [m] of its centre of mass, rotation [rad] from its position at rest\n"
           "(axis times angle), velocity [m/s], spin [rad/s], kinetic_energy [J].")
       .def(
+          "fragments", [](Simulation& s) { return dicts_of(s.fragments()); },
+          "Fragments of broken bodies, now: a list of dicts, one for each, the heaviest first, "
+          "and\n"
+          "one for the dust of each body, phyxels without an unbroken pair: body, fragment (its\n"
+          "number, from 1; 0: dust), first_phyxel, phyxels, mass [kg], centre [m] of mass, "
+          "velocity\n"
+          "[m/s] over the last step, angular_momentum [kg m^2/s] about the centre, spin [rad/s].\n"
+          "Empty in scenes without fracture and notches.")
+      .def(
           "forces", [](Simulation& s) { return taken(s.internal_forces()); },
           "Internal forces [N], (n, 3), a copy.")
       .def(

@@ -128,6 +128,12 @@ class Simulation {
     return read_rigid_bodies(model_, *backend_, *solver_);
   }
 
+  std::vector<FragmentReading> fragments() {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    return read_fragments(model_, *backend_);
+  }
+
   std::vector<ContactReading> contacts() {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
@@ -275,10 +281,10 @@ class Simulation {
     Frame frame;
     frame.state = &state;
     frame.diagnostics = look();
-    frame.readings = {find_reactions(model_, *backend_, *solver_),
-                      probes().read(*backend_, recovery()), read_gases(model_, *backend_, *solver_),
-                      find_contacts(model_, *backend_, *solver_),
-                      read_rigid_bodies(model_, *backend_, *solver_)};
+    frame.readings = {
+        find_reactions(model_, *backend_, *solver_),    probes().read(*backend_, recovery()),
+        read_gases(model_, *backend_, *solver_),        find_contacts(model_, *backend_, *solver_),
+        read_rigid_bodies(model_, *backend_, *solver_), read_fragments(model_, *backend_)};
     SurfelState surfels;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);

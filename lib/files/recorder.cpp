@@ -183,6 +183,10 @@ Recorder::Recorder(const Model& model, const Scene& scene, bool overwrite,
     rigid_.emplace(directory_ / rigid_name,
                    header_of("step,time [s],obstacle,shape", rigid_columns()));
   }
+  if (model.fracture.acts()) {
+    fragments_.emplace(directory_ / fragments_name,
+                       header_of("step,time [s],body,fragment", fragment_columns()));
+  }
   if (point) {
     check_continuation(directory_, *point, overwrite);
     remove_unfinished();
@@ -262,7 +266,8 @@ void Recorder::create_files() {
 
 std::vector<FrameLog*> Recorder::logs() {
   std::vector<FrameLog*> all;
-  for (std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_, &rigid_}) {
+  for (std::optional<FrameLog>* log :
+       {&reactions_, &probes_, &gases_, &contacts_, &rigid_, &fragments_}) {
     if (*log) all.push_back(&**log);
   }
   return all;
@@ -347,6 +352,11 @@ void Recorder::write(const Diagnostics& diagnostics, ChunkedSource& values,
         diagnostics, readings.rigid, rigid_columns(),
         [](const RigidReading& r) { return cell_of(r.obstacle) + "," + cell_of(r.shape); }));
   }
+  if (fragments_ && !readings.fragments.empty()) {
+    fragments_->append(lines_of(
+        diagnostics, readings.fragments, fragment_columns(),
+        [](const FragmentReading& r) { return fmt::format("{},{}", cell_of(r.body), r.number); }));
+  }
   const std::string line = log_line(diagnostics);
   replace_tail(directory_ / log_name, log_size_, line);
   log_size_ += line.size();
@@ -369,7 +379,8 @@ std::vector<fs::path> Recorder::files() const {
   if (writes_phyxels_) files.push_back(phyxels_.file());
   if (writes_surface_) files.push_back(surface_.file());
   files.push_back(directory_ / log_name);
-  for (const std::optional<FrameLog>* log : {&reactions_, &probes_, &gases_, &contacts_, &rigid_}) {
+  for (const std::optional<FrameLog>* log :
+       {&reactions_, &probes_, &gases_, &contacts_, &rigid_, &fragments_}) {
     if (*log) files.push_back((*log)->file());
   }
   return files;

@@ -25,8 +25,9 @@ constexpr std::size_t column_of_time = 1;
 /// True for the name of a file of a trajectory, finished or temporary.
 bool is_trajectory_name(std::string_view name) {
   if (name.ends_with(".tmp")) name.remove_suffix(4);
-  for (const char* one : {"phyxels.hdf.series", "surface.hdf.series", log_name, reactions_name,
-                          gas_name, contacts_name, rigid_name, probes_name, summary_name}) {
+  for (const char* one :
+       {"phyxels.hdf.series", "surface.hdf.series", log_name, reactions_name, gas_name,
+        contacts_name, rigid_name, fragments_name, probes_name, summary_name}) {
     if (name == one) return true;
   }
   const auto numbered = [name](std::string_view prefix, std::string_view suffix) {

@@ -15,6 +15,7 @@ inline constexpr const char* reactions_name = "reactions.csv";
 inline constexpr const char* gas_name = "gas.csv";
 inline constexpr const char* contacts_name = "contacts.csv";
 inline constexpr const char* rigid_name = "rigid.csv";
+inline constexpr const char* fragments_name = "fragments.csv";
 inline constexpr const char* probes_name = "probes.csv";
 inline constexpr const char* summary_name = "run.json";
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "joined_over_ranks.hpp"
 #include "model/row_moment.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/error.hpp"
@@ -130,6 +131,14 @@ std::size_t BrokenPairs::bytes() const {
     bytes += sizeof(i) + sizeof(of_phyxel) + of_phyxel.neighbours.capacity() * sizeof(Index);
   }
   return bytes;
+}
+
+std::vector<PhyxelPair> joined_pairs(const Model& model, std::vector<PhyxelPair> here) {
+  if (!model.share) return here;
+  std::vector<PhyxelPair> all = joined_over_ranks(*model.share->communicator, here);
+  // A pair of two ranks is in the lists of both.
+  all.erase(std::unique(all.begin(), all.end()), all.end());
+  return all;
 }
 
 CrackFaces::CrackFaces(const Model& model) : model_(model) {

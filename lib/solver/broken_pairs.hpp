@@ -72,6 +72,10 @@ class BrokenPairs {
   std::unordered_map<Index, OfPhyxel> broken_;
 };
 
+/// The broken pairs of all ranks, ascending. Collective on a share.
+/// @param here those of this rank
+std::vector<PhyxelPair> joined_pairs(const Model& model, std::vector<PhyxelPair> here);
+
 /// The pairs of broken phyxels that push apart where cracks are closed.
 class CrackFaces {
  public:

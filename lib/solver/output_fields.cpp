@@ -212,7 +212,7 @@ FieldValues OutputFields::find(Backend& backend, const State& state, const Surfe
       of_surfels = surface_->in_range_of(found[q], of_stress(q, stress));
     } else if (q == Quantity::principal_stress) {
       of_surfels = of_stress(q, stress);
-    } else if (q == Quantity::boundary) {
+    } else if (q == Quantity::boundary || q == Quantity::fragment) {
       of_surfels = surface_->nearest(found[q]);
     } else {
       of_surfels = width_of(q) == 6 ? surface_->fitted<6>(found[q]) : surface_->fitted<1>(found[q]);

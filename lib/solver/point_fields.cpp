@@ -4,6 +4,7 @@
 #include <array>
 
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/fragments.hpp"
 #include "phyxel/history.hpp"
 #include "solver/field_point.hpp"
 #include "solver/first_error.hpp"
@@ -35,7 +36,8 @@ std::vector<double> broken_of(const Model& model, const Backend& backend) {
 
 /// True for a field that follows from displacement gradients.
 bool follows_from_gradient(Quantity quantity) {
-  return quantity != Quantity::boundary && quantity != Quantity::broken;
+  return quantity != Quantity::boundary && quantity != Quantity::broken &&
+         quantity != Quantity::fragment;
 }
 
 /// The arrays that a computation fills, by quantity.
@@ -94,7 +96,10 @@ std::span<const PointField> point_fields() {
       {"boundary", Quantity::boundary,
        "sum of 1 for phyxels that are held along an axis, 2 for moved and 4 for loaded ones"},
       {"broken", Quantity::broken,
-       "share of a phyxel's pairs that are broken, by cracks and notches"}};
+       "share of a phyxel's pairs that are broken, by cracks and notches"},
+      {"fragment", Quantity::fragment,
+       "number of a phyxel's fragment, from 1 for the heaviest of the scene; 0 for dust, which has "
+       "lost all its pairs, and in scenes without fracture and notches"}};
   return fields;
 }
 
@@ -120,6 +125,9 @@ FieldValues find_fields(const Model& model, Backend& backend, std::span<const Qu
   if (std::erase(computed, Quantity::boundary) > 0) values[Quantity::boundary] = boundary_of(model);
   if (std::erase(computed, Quantity::broken) > 0) {
     values[Quantity::broken] = broken_of(model, backend);
+  }
+  if (std::erase(computed, Quantity::fragment) > 0) {
+    values[Quantity::fragment] = fragment_numbers(model, backend);
   }
   if (computed.empty()) return values;
   check_fits(model, backend);

@@ -5,14 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "joined_over_ranks.hpp"
 #include "model/fracture.hpp"
 #include "model/owned_vectors.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
 #include "phyxel/physics/verlet.hpp"
-#include "rank_exchange.hpp"
 #include "rank_sums.hpp"
 #include "solver/boundary_conditions.hpp"
+#include "solver/broken_pairs.hpp"
 #include "solver/host_threads.hpp"
 #include "solver/implicit_step.hpp"
 #include "solver/newton.hpp"
@@ -99,17 +100,6 @@ void refuse_impacts(const Model& model, Method method) {
   for (const BodyContact::Pair& pair : model.body_contact.pairs) {
     check(pair.law, "contact.pair", "");
   }
-}
-
-/// The values of all ranks, ascending.
-template <class T>
-std::vector<T> joined_over_ranks(const Communicator& ranks, const std::vector<T>& here) {
-  std::vector<T> all;
-  for (const std::vector<T>& of_rank : allgathered(ranks, here)) {
-    all.insert(all.end(), of_rank.begin(), of_rank.end());
-  }
-  std::sort(all.begin(), all.end());
-  return all;
 }
 
 /// Refuses pairs that break to the search for equilibrium, in which none would.
@@ -229,11 +219,8 @@ State Solver::state() const {
   state.looks = looks_;
   state.step_sums = step_sums();
   if (model_ && model_->share && model_->fracture.acts()) {
-    const Communicator& ranks = *model_->share->communicator;
-    state.broken = joined_over_ranks(ranks, state.broken);
-    // A pair of two ranks is in the lists of both.
-    state.broken.erase(std::unique(state.broken.begin(), state.broken.end()), state.broken.end());
-    state.worn = joined_over_ranks(ranks, state.worn);
+    state.broken = joined_pairs(*model_, std::move(state.broken));
+    state.worn = joined_over_ranks(*model_->share->communicator, state.worn);
   }
   return state;
 }

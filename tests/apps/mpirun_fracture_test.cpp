@@ -17,7 +17,8 @@ using test::Outcome;
 /// A plate with a notch, pulled apart until it breaks; its critical stretches scatter.
 constexpr const char* plate =
     "[time]\nend = 0.04\n[solver]\nprecision = '{precision}'\ndevice = 'cpu'\n"
-    "[output]\nframes_per_second = 250\nfields = ['displacement', 'velocity', 'broken']\n"
+    "[output]\nframes_per_second = 250\nfields = ['displacement', 'velocity', 'broken', "
+    "'fragment']\n"
     "[[body]]\nshape = 'block'\nsize = [0.8, 0.6, 0.12]\nspacing = 0.04\nlattice = 'cells'\n"
     "[body.material]\nyoung = 1e6\npoisson = 0.25\ndensity = 1000\n"
     "[body.fracture]\nenergy_release_rate = 50\nscatter = 20\nseed = 3\n"
@@ -57,6 +58,9 @@ TEST_F(BreakingPlate, BreaksTheSameOnAllRanksAndThreads) {
     ASSERT_EQ(alone.code, 0) << alone.err;
     // The notch leaves 0.5 m by 0.12 m, of which a good part has broken by the end.
     EXPECT_GT(last_energy("alone", "fracture_energy"), 0.1 * 50 * 0.5 * 0.12);
+    // The table of fragments is among the files that are compared.
+    EXPECT_THAT(test::csv_column(test::text_of(folder_ / "alone" / "fragments.csv"), "mass"),
+                ::testing::Each(::testing::Gt(0)));
     for (const int ranks : {2, 3}) {
       const std::string name = std::to_string(ranks);
       const Outcome outcome = run_on(ranks, {"run", "scene.toml", "--out", name, "--force"});

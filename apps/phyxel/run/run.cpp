@@ -202,9 +202,9 @@ void Run::take_steps(StabilityWatch& watch, const Watchdog& watchdog, Progress& 
 Readings Run::read_off() {
   return spent_.timed("energies", [&] {
     Readings found{
-        find_reactions(model(), *backend_, solver_), probes_.read(*backend_, recovery_.get()),
-        read_gases(model(), *backend_, solver_), find_contacts(model(), *backend_, solver_),
-        read_rigid_bodies(model(), *backend_, solver_)};
+        find_reactions(model(), *backend_, solver_),    probes_.read(*backend_, recovery_.get()),
+        read_gases(model(), *backend_, solver_),        find_contacts(model(), *backend_, solver_),
+        read_rigid_bodies(model(), *backend_, solver_), read_fragments(model(), *backend_)};
     held_.keep_wholes(find_held_overlaps(model(), solver_, backend_->rigid_states()));
     deepest_.resize(found.contacts.size());
     deepest_shares_.resize(found.contacts.size());

@@ -131,7 +131,7 @@ class Run {
 
   void check_resumed() const;
 
-  /// Reactions, probes and gases at the present state. Collective.
+  /// All readings at the present state. Collective.
   Readings read_off();
 
   std::shared_ptr<const GoodState> good_state(const Diagnostics& now) const;

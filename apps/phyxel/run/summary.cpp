@@ -8,6 +8,7 @@
 #include "outside_text.hpp"
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/law_table.hpp"
+#include "run/fragment_summary.hpp"
 #include "run/run.hpp"
 #include "version.hpp"
 
@@ -317,6 +318,7 @@ nlohmann::ordered_json Run::summary_of(const Diagnostics& now, std::int64_t byte
             {"gases", json_of(readings_.gases)},
             {"contacts", json_of(readings_.contacts, deepest_)},
             {"rigid_bodies", json_of(readings_.rigid)},
+            {"fragments", json_of(readings_.fragments)},
             {"warnings", warnings},
             {"frames", recorder_->frames_written()},
             {"directory", recorder_->directory().string()},
@@ -463,6 +465,7 @@ void Run::say_summary(const Diagnostics& now, std::int64_t bytes, const Traffic&
   say_gases();
   say_contacts();
   say_rigid_bodies();
+  say_fragments(readings_.fragments);
   if (now.inverted > 0) {
     fmt::print(
         "  warning     {} phyxels are inside out (det F <= 0) at the end; a finer time step will "

@@ -170,7 +170,8 @@ class _Family:
 class Trajectory:
     """What a run has written: `phyxels` and `surface`, frames each, `energy`, the columns of
     energy.csv, `reactions`, those of reactions.csv, `probes`, those of probes.csv, `gases`,
-    those of gas.csv, `contacts`, those of contacts.csv, and `rigid_bodies`, those of rigid.csv.
+    those of gas.csv, `contacts`, those of contacts.csv, `rigid_bodies`, those of rigid.csv, and
+    `fragments`, those of fragments.csv.
 
         trajectory = phyxel.Trajectory("out/dino")
         for frame in trajectory.surface: ...
@@ -223,6 +224,14 @@ class Trajectory:
         return {name: columns for (name, _), columns in self._log("rigid.csv", str).items()}
 
     @property
+    def fragments(self) -> dict[tuple[str, int], dict[str, numpy.ndarray]]:
+        """{(body, fragment): {column: values}}, one for each frame in which the fragment of this
+        number exists: `time` [s] tells which; 1 is the heaviest at that time, 0 the dust of the
+        body. Masses [kg], centres [m], velocities [m/s], angular momenta [kg m^2/s], spins [rad/s].
+        Empty without bodies that may break."""
+        return self._log("fragments.csv", int)
+
+    @property
     def probes(self) -> dict[tuple[str, int], dict[str, numpy.ndarray]]:
         """{(probe, point): {column: values}}, one for each frame; points are counted from 1. Empty
         without any."""
@@ -234,7 +243,7 @@ class Trajectory:
 
             trajectory.table("energy").plot(x="time", y=["kinetic_energy", "strain_energy"])
 
-        name: energy, reactions, gases, contacts, rigid_bodies or probes. Needs pandas.
+        name: energy, reactions, gases, contacts, rigid_bodies, fragments or probes. Needs pandas.
         """
         if name not in self._KEYS:
             allowed = ", ".join(self._KEYS)
@@ -254,7 +263,8 @@ class Trajectory:
 
     #: Columns of names in each log.
     _KEYS = {"energy": (), "reactions": ("body", "set"), "gases": ("body", "set"),
-             "contacts": ("obstacle",), "rigid_bodies": ("obstacle",), "probes": ("probe", "point")}
+             "contacts": ("obstacle",), "rigid_bodies": ("obstacle",),
+             "fragments": ("body", "fragment"), "probes": ("probe", "point")}
 
     def _log(self, name, second):
         """The rows of a log by their third and fourth cells, of which the latter is a `second`."""

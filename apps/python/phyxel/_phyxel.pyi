@@ -123,6 +123,12 @@ class SimulationBase:
         """Obstacles that are free rigid bodies, now: a list of dicts, one for each:
         obstacle, place [m] of its centre of mass, rotation [rad] from its position at rest
         (axis times angle), velocity [m/s], spin [rad/s], kinetic_energy [J]."""
+    def fragments(self) -> list[dict[str, Any]]:
+        """Fragments of broken bodies, now: a list of dicts, one for each, the heaviest first, and
+        one for the dust of each body, phyxels without an unbroken pair: body, fragment (its
+        number, from 1; 0: dust), first_phyxel, phyxels, mass [kg], centre [m] of mass, velocity
+        [m/s] over the last step, angular_momentum [kg m^2/s] about the centre, spin [rad/s].
+        Empty in scenes without fracture and notches."""
     def forces(self) -> NDArray[Any]:
         """Internal forces [N], (n, 3), a copy."""
     def gradients(self) -> NDArray[Any]:

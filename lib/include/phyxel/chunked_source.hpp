@@ -25,6 +25,7 @@ enum class Quantity {
   strain,
   boundary,
   broken,           ///< Broken share of the pairs.
+  fragment,         ///< Number of the fragment (`fragment_numbers`).
   surfel_position,  ///< Deformed.
   surfel_normal,
   history  ///< The first column of a state's history; further ones follow (`history_quantity`).
@@ -67,6 +68,7 @@ constexpr std::size_t width_of(Quantity quantity) {
     case Quantity::volume_ratio:
     case Quantity::boundary:
     case Quantity::broken:
+    case Quantity::fragment:
       return 1;
     case Quantity::stress:
     case Quantity::strain:

@@ -13,6 +13,7 @@
 #include "phyxel/diagnostics.hpp"
 #include "phyxel/equilibrium.hpp"
 #include "phyxel/error.hpp"
+#include "phyxel/fragments.hpp"
 #include "phyxel/law_table.hpp"
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"

@@ -12,6 +12,7 @@
 #include "phyxel/backend.hpp"
 #include "phyxel/chunked_source.hpp"
 #include "phyxel/contacts.hpp"
+#include "phyxel/fragments.hpp"
 #include "phyxel/gases.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/point_fields.hpp"
@@ -23,11 +24,12 @@ namespace phyxel {
 
 /// What is read off at each frame.
 struct Readings {
-  std::vector<Reaction> reactions;       ///< Of supports (`find_reactions`), or none.
-  std::vector<ProbeReading> probes;      ///< Of the scene's probes (`Probes::read`), or none.
-  std::vector<GasReading> gases;         ///< Of gases in cavities (`read_gases`), or none.
-  std::vector<ContactReading> contacts;  ///< Of obstacles (`find_contacts`), or none.
-  std::vector<RigidReading> rigid;       ///< Of free rigid bodies (`read_rigid_bodies`), or none.
+  std::vector<Reaction> reactions;         ///< Of supports (`find_reactions`), or none.
+  std::vector<ProbeReading> probes;        ///< Of the scene's probes (`Probes::read`), or none.
+  std::vector<GasReading> gases;           ///< Of gases in cavities (`read_gases`), or none.
+  std::vector<ContactReading> contacts;    ///< Of obstacles (`find_contacts`), or none.
+  std::vector<RigidReading> rigid;         ///< Of free rigid bodies (`read_rigid_bodies`), or none.
+  std::vector<FragmentReading> fragments;  ///< Of broken bodies (`read_fragments`), or none.
 };
 
 /// Fields of one frame; only those that the scene's `output.fields` names are filled.
@@ -134,6 +136,7 @@ bool holds_only_a_start(const std::filesystem::path& directory, const Scene& sce
 ///   gas.csv                                    of a scene with gases: one line a frame and gas
 ///   contacts.csv                               one line a frame and obstacle, if there are any
 ///   rigid.csv                                  one line a frame and free rigid body, likewise
+///   fragments.csv                              one line a frame and fragment, if bodies may break
 ///   run.json                                   at the end, what `write_summary` is given
 /// Each frame is written atomically, after allocating its disk space. Metadata are in the group
 /// `/phyxel`.
@@ -186,8 +189,8 @@ class Recorder {
   SeriesFile phyxels_, surface_;
   std::vector<std::filesystem::path> unsynced_;  // frames to be flushed
   std::size_t log_size_ = 0;                     // size of energy.csv [bytes]
-  // Set if the model has supports, probes, gases, and obstacles.
-  std::optional<FrameLog> reactions_, probes_, gases_, contacts_, rigid_;
+  // Set if the model has supports, probes, gases, obstacles, and bodies that may break.
+  std::optional<FrameLog> reactions_, probes_, gases_, contacts_, rigid_, fragments_;
 
   /// Those of them that are set.
   std::vector<FrameLog*> logs();
