@@ -44,6 +44,7 @@ class Bodies {
     if (surface != nullptr && surface->normal.size() != surface->point.size()) {
       made_normal_ = vertex_normals(surface->point, surface->triangle);
     }
+    if (surface != nullptr && phyxels != nullptr) find_torn(*phyxels, setting.colouring);
   }
 
   bool any() const { return frame_ != nullptr; }
@@ -55,15 +56,32 @@ class Bodies {
       rasteriser.draw_surface(surface_->point,
                               made_normal_.empty() ? surface_->normal : made_normal_,
                               surface_->triangle, colour_, body_numbers(*surface_));
+      rasteriser.draw_spheres(torn_, torn_colour_, torn_body_, style_of(rasteriser.camera()));
     } else {
-      const Camera& camera = rasteriser.camera();
-      const DotStyle style{.radius = radius_,
-                           .largest = 0.04 * std::min(camera.width, camera.height)};
-      rasteriser.draw_spheres(frame_->point, colour_, body_numbers(*frame_), style);
+      rasteriser.draw_spheres(frame_->point, colour_, body_numbers(*frame_),
+                              style_of(rasteriser.camera()));
     }
   }
 
  private:
+  DotStyle style_of(const Camera& camera) const {
+    return {.radius = radius_, .largest = 0.04 * std::min(camera.width, camera.height)};
+  }
+
+  /// Finds the phyxels that have lost pairs, which are seen where a surface has opened.
+  void find_torn(const FrameData& phyxels, const std::optional<Colouring>& colouring) {
+    const auto broken = field_values(phyxels, "broken");
+    if (!broken) return;
+    std::vector<Colour> colour = colours(phyxels, body_colour);
+    const auto values = colouring ? field_values(phyxels, colouring->field) : std::nullopt;
+    for (std::size_t i = 0; i < phyxels.point.size(); ++i) {
+      if (!((*broken)[i] > 0)) continue;
+      torn_.push_back(phyxels.point[i]);
+      torn_colour_.push_back(values ? field_colour((*values)[i], *colouring) : colour[i]);
+      torn_body_.push_back(body_numbers(phyxels).empty() ? 0 : phyxels.body[i]);
+    }
+  }
+
   /// Colours the points by a field. NaN has the colour of the lowest value.
   void colour_by_field(const FrameData* surface, const FrameData* phyxels,
                        const Colouring& colouring) {
@@ -78,6 +96,10 @@ class Bodies {
   double radius_;  // of phyxels without a surface [m]
   std::vector<Colour> colour_;
   std::vector<Vec3d> made_normal_;  // unless the frame has some
+  // Phyxels beside cracks of a surface.
+  std::vector<Vec3d> torn_;
+  std::vector<Colour> torn_colour_;
+  std::vector<Index> torn_body_;
 };
 
 /// Adds the extents of an obstacle across the light, up to a distance from the middle: those of a

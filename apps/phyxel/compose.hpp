@@ -37,7 +37,8 @@ double typical_spacing(const std::vector<Vec3d>& point);
 double round_length(const Camera& camera, Vec3d place);
 
 /// Draws a frame, without dots of phyxels if these are too near to each other or colours show a
-/// field. @param surface,phyxels frames of the same time; null if not drawn
+/// field. Phyxels that have lost pairs, by the field `broken` of their frame, are balls that fill
+/// the cracks of a surface. @param surface,phyxels frames of the same time; null if not drawn
 Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Setting& setting);
 
 }  // namespace phyxel::app

@@ -23,7 +23,10 @@ class FileWriter::Asking : public ChunkedSource {
   std::span<const double> values(Quantity quantity, Index begin, Index end) override {
     return values_ = writer_.asked(quantity, {begin, end});
   }
-  std::span<const Triangle> triangles() const override { return writer_.shared_.triangles(); }
+  std::span<const Triangle> triangles() const override {
+    const std::vector<Triangle>* of_frame = moment_.frame.triangles;
+    return of_frame ? *of_frame : writer_.shared_.triangles();
+  }
   /// True for arrays longer than one chunk, if HDF5 is parallel.
   bool writes_collectively(Index count) const override {
     return can_write_collectively() && count > length();

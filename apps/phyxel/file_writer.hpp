@@ -23,8 +23,9 @@ namespace phyxel::app {
 struct Moment {
   std::shared_ptr<const State> state;
   SurfelState surfels;
-  Frame frame;                     ///< Refers to the other members.
-  std::vector<Quantity> optional;  ///< The optional quantities that any rank has.
+  std::optional<std::vector<Triangle>> triangles;  ///< Those that cracks leave; unset: all.
+  Frame frame;                                     ///< Refers to the other members.
+  std::vector<Quantity> optional;                  ///< The optional quantities that any rank has.
 };
 
 /// Writer of files on a thread of the first rank, one file after the other, while all ranks step.

@@ -104,8 +104,8 @@ class Stage {
   Image draw(std::size_t shot, std::size_t picture) {
     if (!cameras_.empty()) setting_.camera = cameras_[picture];
     const bool fields = setting_.colouring.has_value();
-    const auto surface = read_if_any(shots_[shot].surface, fields),
-               phyxels = read_if_any(shots_[shot].phyxels, fields);
+    const auto surface = read_if_any(shots_[shot].surface, fields);
+    const auto phyxels = read_if_any(shots_[shot].phyxels, fields || surface);
     return draw_picture(surface ? &*surface : nullptr, phyxels ? &*phyxels : nullptr, setting_);
   }
 

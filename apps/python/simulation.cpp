@@ -179,10 +179,12 @@ void add_simulation(py::module_& module) {
       .def_property_readonly("volume", of_model(&Model::volume), "At rest [m^3], (n,)")
       .def_property_readonly(
           "triangles",
-          [](py::object self) {
-            return view(self.cast<Simulation&>().model().surfels.triangle, self);
+          [](py::object self) -> py::array {
+            Simulation& s = self.cast<Simulation&>();
+            if (auto uncut = s.uncut()) return taken(std::move(*uncut));
+            return view(s.model().surfels.triangle, self);
           },
-          "Of the surface, (t, 3).")
+          "Of the surface, (t, 3): those that no crack crosses now.")
       .def_property_readonly(
           "neighbours",
           [](py::object self) {

@@ -15,6 +15,7 @@
 #include "phyxel/gases.hpp"
 #include "phyxel/history.hpp"
 #include "phyxel/model.hpp"
+#include "phyxel/open_surface.hpp"
 #include "phyxel/output_fields.hpp"
 #include "phyxel/reactions.hpp"
 #include "phyxel/recorder.hpp"
@@ -138,6 +139,14 @@ class Simulation {
     const auto turn = my_turn();
     const py::gil_scoped_release others;
     return find_contacts(model_, *backend_, *solver_);
+  }
+
+  /// The triangles of the surface that no crack crosses; nothing if none is crossed.
+  std::optional<std::vector<Triangle>> uncut() const {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    if (!model_.fracture.acts()) return std::nullopt;
+    return uncut_of(solver_->state());
   }
 
   State state() const {
@@ -275,6 +284,10 @@ class Simulation {
     return *probes_;
   }
 
+  std::optional<std::vector<Triangle>> uncut_of(const State& state) const {
+    return uncut_triangles(model_, model_.surfels.triangle, state.broken);
+  }
+
   void write_one() {
     if (!recorder_) throw InputError("write_frame: nothing is recorded yet; needed first: record");
     const State state = solver_->state();
@@ -286,9 +299,12 @@ class Simulation {
         read_gases(model_, *backend_, *solver_),        find_contacts(model_, *backend_, *solver_),
         read_rigid_bodies(model_, *backend_, *solver_), read_fragments(model_, *backend_)};
     SurfelState surfels;
+    std::optional<std::vector<Triangle>> uncut;
     if (scene_.output.surface && !model_.surfels.position.empty()) {
       backend_->advect_surfels(surfels);
       frame.surfels = &surfels;
+      uncut = uncut_of(state);
+      if (uncut) frame.triangles = &*uncut;
     }
     if (!fields_) fields_.emplace(model_, scene_.output);
     frame.fields = fields_->find(*backend_, state, frame.surfels, recovery());

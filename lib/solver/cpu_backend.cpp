@@ -181,6 +181,9 @@ class CpuBackend final : public Backend, private CpuFracture<Real, StateReal> {
   void update_surfels() override { advect_surfels(moved_surfels_); }
   void advect_surfels(SurfelState& out) override {
     if (!surfels_) surfels_.emplace(model_, layout_);
+    if (model_.fracture.acts()) {
+      surfels_->cut(layout_, {model_, joined_pairs(model_, this->broken_pairs().pairs())});
+    }
     AlignedVector<StateReal> records(static_cast<std::size_t>(layout_.slots()) *
                                      CarrierRecord::size);
 #pragma omp parallel for schedule(static) num_threads(threads_)

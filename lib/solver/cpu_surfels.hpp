@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
 
 #include "phyxel/physics/surfel.hpp"
 #include "phyxel/state.hpp"
@@ -52,6 +53,17 @@ class CpuSurfels {
     }
   }
 
+  /// Takes the carriers on the other sides of cracks from surfels, and gives back those that it
+  /// took before from others.
+  void cut(const Layout& layout, CrackSides sides) {
+    if (sides.broken() == sides_.broken()) return;
+    const CrackSides before = std::exchange(sides_, std::move(sides));
+    const auto count = static_cast<Index>(model_.surfels.position.size());
+    for (Index s = 0; s < count; ++s) {
+      if (before.may_cut(model_, s) || sides_.may_cut(model_, s)) set_carriers(layout, s);
+    }
+  }
+
   /// Computes positions and normals of all surfels. @param records carrier records of all slots
   void advect(const AlignedVector<Real>& records, int threads, SurfelState& out) const {
     const auto count = static_cast<Index>(model_.surfels.position.size());
@@ -91,7 +103,7 @@ class CpuSurfels {
   /// weight zero.
   void set_carriers(const Layout& layout, Index s) {
     const auto carriers = model_.surfels.carriers.row(s);
-    const std::vector<double> weights = carrier_weights(model_, s);
+    const std::vector<double> weights = carrier_weights(model_, s, sides_);
     const Index p = s / W, lane = s % W;
     const auto longest = static_cast<std::size_t>((start_[p + 1] - start_[p]) / W);
     for (std::size_t k = 0; k < longest; ++k) {
@@ -116,6 +128,7 @@ class CpuSurfels {
   std::vector<Offset> start_;  // first carrier of each pack
   AlignedVector<Index> carrier_;
   AlignedVector<Real> weight_, position_, normal_;
+  CrackSides sides_;
 };
 
 }  // namespace phyxel

@@ -3,11 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <unordered_map>
 
+#include "model/nearest_carrier.hpp"
 #include "model/owned_vectors.hpp"
 #include "model/parts.hpp"
 #include "model/point_fit.hpp"
 #include "phyxel/history.hpp"
+#include "solver/carrier_weights.hpp"
+#include "solver/crack_sides.hpp"
 #include "solver/tensors.hpp"
 
 namespace phyxel {
@@ -38,12 +42,29 @@ class OutputFields::SurfaceFit {
     }
   }
 
-  /// Values fitted to those of the phyxels around, shape [surfels, width]. Collective on a share.
+  /// The weights of the carriers of those surfels from which cracks have cut some.
+  using CutWeights = std::unordered_map<Index, std::vector<double>>;
+  CutWeights cut_by(const CrackSides& sides) const {
+    CutWeights cut;
+    for (Index s = 0; s < near_.rows() && !sides.empty(); ++s) {
+      const std::vector<char> kept = sides.on_side(model_, s);
+      if (std::find(kept.begin(), kept.end(), 0) == kept.end()) continue;
+      cut[s] = carrier_weights(model_, s, sides);
+    }
+    return cut;
+  }
+
+  /// Values fitted to those of the phyxels around, shape [surfels, width]; of surfels beside cracks
+  /// the weighted mean of the carriers that are left. Collective on a share.
   /// @param of_phyxels shape [n, width]; those of ghosts do not matter
   template <std::size_t width>
-  std::vector<double> fitted(const std::vector<double>& of_phyxels) const {
+  std::vector<double> fitted(const std::vector<double>& of_phyxels, const CutWeights& cut) const {
     const auto value = with_ghosts<width>(of_phyxels);
     return for_each_surfel<width>([&](Index s, std::span<const Index> row, std::size_t c) {
+      if (const auto found = cut.find(s); found != cut.end()) {
+        return mean(found->second, model_.surfels.carriers.row(s),
+                    [&](Index i) { return value[i][c]; });
+      }
       double sum = 0;
       for (std::size_t k = 0; k < row.size(); ++k) {
         sum += share_[static_cast<std::size_t>(near_.offsets[s]) + k] * value[row[k]][c];
@@ -71,12 +92,8 @@ class OutputFields::SurfaceFit {
   /// The carriers of the same part as the nearest, in an order that does not depend on ranks.
   std::vector<Index> nearest_first(Vec3d point, std::span<const Index> carriers) const {
     std::vector<Index> row(carriers.begin(), carriers.end());
-    const auto is_nearer = [&](Index a, Index b) {
-      const Vec3d x = model_.position[a] - point, y = model_.position[b] - point;
-      const double to_a = dot(x, x), to_b = dot(y, y);
-      return to_a != to_b ? to_a < to_b : model_.global_id(a) < model_.global_id(b);
-    };
-    std::sort(row.begin(), row.end(), is_nearer);
+    std::sort(row.begin(), row.end(),
+              [&](Index a, Index b) { return is_nearer(model_, point, a, b); });
     std::erase_if(row, [first = row.empty() ? 0 : row.front(), this](Index i) {
       return !are_of_one_part(model_, first, i);
     });
@@ -116,6 +133,17 @@ class OutputFields::SurfaceFit {
       }
     }
     return found;
+  }
+
+  template <class ValueOf>
+  static double mean(const std::vector<double>& weights, std::span<const Index> row,
+                     ValueOf&& value_of) {
+    double sum = 0, all = 0;
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      if (weights[k] > 0) sum += weights[k] * value_of(row[k]);
+      all += weights[k];
+    }
+    return sum / all;
   }
 
   template <class ValueOf>
@@ -199,9 +227,10 @@ FieldValues OutputFields::find(Backend& backend, const State& state, const Surfe
   }
   if (wanted_.empty() && columns_ == 0) return found;
   if (!surface_) surface_ = std::make_unique<const SurfaceFit>(model_);
+  const auto cut = surface_->cut_by({model_, state.broken});
   std::vector<double> stress;
   if (contains(needed, Quantity::stress)) {
-    stress = surface_->fitted<6>(found[Quantity::stress]);
+    stress = surface_->fitted<6>(found[Quantity::stress], cut);
   }
   if (adds_stress) found.erase(Quantity::stress);
   for (const Quantity q : wanted_) {
@@ -215,11 +244,12 @@ FieldValues OutputFields::find(Backend& backend, const State& state, const Surfe
     } else if (q == Quantity::boundary || q == Quantity::fragment) {
       of_surfels = surface_->nearest(found[q]);
     } else {
-      of_surfels = width_of(q) == 6 ? surface_->fitted<6>(found[q]) : surface_->fitted<1>(found[q]);
+      of_surfels = width_of(q) == 6 ? surface_->fitted<6>(found[q], cut)
+                                    : surface_->fitted<1>(found[q], cut);
     }
   }
   for (std::size_t k = 0; k < std::min(columns_, state.history.size()); ++k) {
-    found[on_surface(history_quantity(k))] = surface_->fitted<1>(state.history[k].values);
+    found[on_surface(history_quantity(k))] = surface_->fitted<1>(state.history[k].values, cut);
   }
   return found;
 }

@@ -4,9 +4,13 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "phyxel/recorder.hpp"
 #include "support/csv_column.hpp"
+#include "support/page.hpp"
 #include "support/program.hpp"
+#include "support/skips.hpp"
 
 namespace phyxel {
 namespace {
@@ -93,9 +97,48 @@ TEST_F(FractureOfRuns, FragmentsAreTold) {
     EXPECT_NEAR(column("mass")[k], 1000 * 0.3 * 0.2 * 0.2, 1e-12);
     EXPECT_EQ(column("phyxels")[k], 6 * 16);
   }
+  // The surface has lost a ring of triangles around the cut, and nothing else.
+  const FrameData frame =
+      read_frame(read_series(folder_ / "out" / "surface.hdf.series").back().file, true);
+  for (const Triangle& t : frame.triangle) {
+    const auto number = [&](std::size_t c) { return frame.field.at("fragment")[t[c]]; };
+    EXPECT_TRUE(number(0) == number(1) && number(1) == number(2));
+  }
   const Outcome again = run({"run", "scene.toml", "--out", "again"});
   EXPECT_THAT(again.out,
               HasSubstr("  fragments   2, the heaviest with 62.5% of the mass; no dust"));
+}
+
+/// The page of a run draws, of each frame, the triangles that the frame has.
+TEST_F(FractureOfRuns, PagesOpenAsFramesDo) {
+  write("scene.toml",
+        "[time]\nend = 0.04\n[output]\nframes_per_second = 250\nfields = ['broken', 'fragment']\n"
+        "[[body]]\nshape = 'block'\nsize = [0.8, 0.6, 0.12]\nspacing = 0.04\nlattice = 'cells'\n"
+        "[body.material]\nyoung = 1e6\npoisson = 0.25\ndensity = 1000\n"
+        "[body.fracture]\nenergy_release_rate = 50\n"
+        "[[body.notch]]\ncentre = [-0.4, 0.001, 0]\nnormal = [0, 1, 0]\nradius = 0.3\n"
+        "[[body.motion]]\nregion = 'y+'\nvelocity = [0, 1, 0]\n"
+        "[[body.motion]]\nregion = 'y-'\nvelocity = [0, -1, 0]\n");
+  ASSERT_EQ(run({"run", "scene.toml", "--out", "out", "--no-pictures"}).code, 0);
+  const Outcome outcome = run({"report", "out", "-o", "page.html"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const std::string page = text_of(folder_ / "page.html");
+  const json data = test::data_of(page);
+  const std::vector<std::uint32_t> corners = test::embedded<std::uint32_t>(page, "triangles");
+  const std::vector<SeriesEntry> frames = read_series(folder_ / "out" / "surface.hdf.series");
+  ASSERT_EQ(data["uncut"].size(), frames.size());
+  EXPECT_LT(data["uncut"].back(), data["uncut"].front());
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    std::set<Triangle> drawn;
+    for (std::size_t t = 0; t < data["uncut"][k].get<std::size_t>(); ++t) {
+      drawn.insert({static_cast<Index>(corners[3 * t]), static_cast<Index>(corners[3 * t + 1]),
+                    static_cast<Index>(corners[3 * t + 2])});
+    }
+    const std::vector<Triangle> of_frame = read_frame(frames[k].file).triangle;
+    EXPECT_EQ(drawn, std::set<Triangle>(of_frame.begin(), of_frame.end())) << k;
+  }
+  PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
+  EXPECT_THAT(test::seen_by_browser(folder_, "page.html#t=0.04"), HasSubstr("data-error=\"0\""));
 }
 
 TEST_F(FractureOfRuns, WrongInputIsRefusedWithWhatIsAllowed) {

@@ -6,6 +6,7 @@
 
 #include "mpirun.hpp"
 #include "phyxel/checkpoint.hpp"
+#include "phyxel/recorder.hpp"
 #include "support/csv_column.hpp"
 
 namespace phyxel {
@@ -58,7 +59,10 @@ TEST_F(BreakingPlate, BreaksTheSameOnAllRanksAndThreads) {
     ASSERT_EQ(alone.code, 0) << alone.err;
     // The notch leaves 0.5 m by 0.12 m, of which a good part has broken by the end.
     EXPECT_GT(last_energy("alone", "fracture_energy"), 0.1 * 50 * 0.5 * 0.12);
-    // The table of fragments is among the files that are compared.
+    // The surface opens, and the table of fragments is among the files that are compared.
+    const std::vector<SeriesEntry> frames = read_series(folder_ / "alone" / "surface.hdf.series");
+    EXPECT_LT(read_frame(frames.back().file).triangle.size(),
+              read_frame(frames.front().file).triangle.size());
     EXPECT_THAT(test::csv_column(test::text_of(folder_ / "alone" / "fragments.csv"), "mass"),
                 ::testing::Each(::testing::Gt(0)));
     for (const int ranks : {2, 3}) {

@@ -87,6 +87,34 @@ TEST(Thinning, JoinsNoTwoBodies) {
   EXPECT_EQ(seen.size(), 2u);
 }
 
+/// Frames of a surface that cracks open have the first of its triangles, fewer and fewer, in the
+/// whole surface and in a thinned one.
+TEST(Thinning, OrdersTrianglesByWhenTheyAreGone) {
+  const FrameData ball = sphere({0, 0, 0}, 1, 30);
+  for (const std::size_t most : {ball.point.size(), std::size_t{300}}) {
+    const ThinnedSurface thin = thinned(ball, most);
+    std::vector<std::vector<Triangle>> of_frames;
+    for (const double height : {2.0, 0.5, 0.5, -0.2, -2.0}) {
+      std::vector<Triangle> below;
+      for (const Triangle& t : ball.triangle) {
+        if (ball.point[static_cast<std::size_t>(t[0])].z < height) below.push_back(t);
+      }
+      of_frames.push_back(thin.shown(below));
+    }
+    std::vector<Triangle> ordered = thin.triangle;
+    const std::vector<std::size_t> counts = sort_by_last_frame(ordered, of_frames);
+    ASSERT_EQ(counts.size(), of_frames.size());
+    EXPECT_EQ(counts.front(), thin.triangle.size());
+    EXPECT_GT(counts[1], counts[3]);
+    EXPECT_GT(counts[3], 0u);
+    EXPECT_EQ(counts.back(), 0u);
+    for (std::size_t k = 0; k < counts.size(); ++k) {
+      const auto end = ordered.begin() + static_cast<std::ptrdiff_t>(counts[k]);
+      EXPECT_EQ(std::set(ordered.begin(), end), std::set(of_frames[k].begin(), of_frames[k].end()));
+    }
+  }
+}
+
 TEST(Thinning, BearsPointsThatAreNotFinite) {
   FrameData ball = sphere({0, 0, 0}, 1, 20);
   for (std::size_t s = 0; s < ball.point.size(); s += 7) ball.point[s].y = std::nan("");

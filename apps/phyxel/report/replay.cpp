@@ -74,6 +74,7 @@ class Replay {
     Report report;
     report.frames = chosen_.size();
     const std::vector<Instance> instances = read_instances();
+    order_triangles();
     report.surfels = instances.front().surfels.size();
     report.phyxels = instances.front().phyxels.size();
     report.fields = field_names_;
@@ -264,8 +265,21 @@ class Replay {
     if (const auto* v = written("velocity")) fields.push_back({"speed", "m/s", lengths(*v)});
     if (const auto* s = written("von_mises")) fields.push_back({"stress (von Mises)", "Pa", *s});
     if (const auto* j = written("volume_ratio")) fields.push_back({"volume ratio", "", *j});
+    if (const auto* b = written("broken")) fields.push_back({"broken share", "", *b});
+    if (const auto* f = written("fragment")) fields.push_back({"fragment", "", *f});
     if (rebuilt_) rebuilt_->add_fields(frame, fields);
     return fields;
+  }
+
+  /// Orders the triangles so that each frame has the first ones, where cracks cross more and more.
+  void order_triangles() {
+    if (!cracks_) return;
+    std::vector<std::vector<Triangle>> of_frames;
+    for (const std::size_t shot : chosen_) {
+      of_frames.push_back(
+          shown_surface_.shown(read_frame(trajectory_.shots[shot].surface).triangle));
+    }
+    uncut_ = sort_by_last_frame(shown_surface_.triangle, std::move(of_frames));
   }
 
   std::vector<Instance> read_instances() {
@@ -276,6 +290,7 @@ class Replay {
       const auto surface = read(trajectory_.shots[shot].surface, first_surface_);
       const auto phyxels = read(trajectory_.shots[shot].phyxels, first_phyxels_);
       if (surface) instance.surfels = some(surface->point, shown_surface_.surfel);
+      if (surface && surface->triangle.size() != first_surface_->triangle.size()) cracks_ = true;
       if (phyxels) instance.phyxels = each(phyxels->point, stride_);
       std::vector<Field> fields = fields_of(phyxels ? *phyxels : *surface);
       const bool same = std::equal(
@@ -392,6 +407,7 @@ class Replay {
     data["obstacles"] = obstacles_json(
         floor ? std::vector{floor_of(instances, extent)} : obstacles_, paths_, times, extent);
     data["only_floor"] = floor;
+    if (!uncut_.empty()) data["uncut"] = uncut_;
     data["spacing"] = spacing / radius;
     data["carriers"] = Carriers::each;
     const auto axes = upright_axes(pictures_.up);
@@ -441,7 +457,9 @@ class Replay {
   std::vector<Obstacle> obstacles_;
   RigidPaths paths_;  // of those that are free bodies
   std::vector<std::size_t> chosen_;
-  ThinnedSurface shown_surface_;  // of the first frame; empty without a surface
+  ThinnedSurface shown_surface_;    // of the first frame; empty without a surface
+  bool cracks_ = false;             // true if later frames lack triangles of the first
+  std::vector<std::size_t> uncut_;  // triangles of each frame; empty: all have all
   std::size_t stride_ = 1;
   std::vector<std::string> field_names_, field_units_, notes_;
 };

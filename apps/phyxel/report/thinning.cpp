@@ -7,6 +7,8 @@
 #include <limits>
 #include <numeric>
 
+#include "sort_unique.hpp"
+
 namespace phyxel::app {
 namespace {
 
@@ -76,26 +78,52 @@ std::vector<std::size_t> representatives(const std::vector<Vec3d>& point, const 
   return chosen;
 }
 
-/// The triangles whose corners are in three cells, once each, in the order of the surface.
-std::vector<Triangle> triangles_between(const FrameData& surface, const Cells& cells,
-                                        const std::vector<std::size_t>& position) {
+}  // namespace
+
+/// Triangles whose corners have three representatives, once each.
+std::vector<Triangle> ThinnedSurface::shown(const std::vector<Triangle>& of_surface) const {
+  if (representative.empty()) return of_surface;
   std::vector<Triangle> kept;
-  for (const Triangle& triangle : surface.triangle) {
+  for (const Triangle& triangle : of_surface) {
     Triangle merged;
     for (std::size_t c = 0; c < 3; ++c) {
-      merged[c] =
-          static_cast<Index>(position[cells.of_surfel[static_cast<std::size_t>(triangle[c])]]);
+      merged[c] = static_cast<Index>(representative[static_cast<std::size_t>(triangle[c])]);
     }
     if (merged[0] == merged[1] || merged[1] == merged[2] || merged[2] == merged[0]) continue;
     std::rotate(merged.begin(), std::min_element(merged.begin(), merged.end()), merged.end());
     kept.push_back(merged);
   }
-  std::sort(kept.begin(), kept.end());
-  kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
+  sort_unique(kept);
   return kept;
 }
 
-}  // namespace
+std::vector<std::size_t> sort_by_last_frame(std::vector<Triangle>& triangles,
+                                            std::vector<std::vector<Triangle>> of_frames) {
+  struct Lasting {
+    std::size_t frames;  // that have the triangle, from the first
+    Triangle triangle;
+  };
+  std::vector<Lasting> lasting;
+  for (const Triangle& triangle : triangles) lasting.push_back({0, triangle});
+  for (std::vector<Triangle>& of_frame : of_frames) std::sort(of_frame.begin(), of_frame.end());
+  for (Lasting& one : lasting) {
+    while (one.frames < of_frames.size() &&
+           std::binary_search(of_frames[one.frames].begin(), of_frames[one.frames].end(),
+                              one.triangle)) {
+      ++one.frames;
+    }
+  }
+  std::stable_sort(lasting.begin(), lasting.end(),
+                   [](const Lasting& a, const Lasting& b) { return a.frames > b.frames; });
+  for (std::size_t k = 0; k < lasting.size(); ++k) triangles[k] = lasting[k].triangle;
+  std::vector<std::size_t> counts;
+  for (std::size_t frame = 0; frame < of_frames.size(); ++frame) {
+    const auto end = std::find_if(lasting.begin(), lasting.end(),
+                                  [&](const Lasting& one) { return one.frames <= frame; });
+    counts.push_back(static_cast<std::size_t>(end - lasting.begin()));
+  }
+  return counts;
+}
 
 ThinnedSurface thinned(const FrameData& surface, std::size_t most) {
   const std::size_t n = surface.point.size();
@@ -129,13 +157,12 @@ ThinnedSurface thinned(const FrameData& surface, std::size_t most) {
   const std::vector<std::size_t> chosen = representatives(surface.point, cells);
   result.surfel = chosen;
   std::sort(result.surfel.begin(), result.surfel.end());
-  std::vector<std::size_t> position(cells.count);
-  for (std::size_t c = 0; c < cells.count; ++c) {
-    position[c] = static_cast<std::size_t>(
-        std::lower_bound(result.surfel.begin(), result.surfel.end(), chosen[c]) -
-        result.surfel.begin());
+  for (const std::size_t cell : cells.of_surfel) {
+    result.representative.push_back(static_cast<std::size_t>(
+        std::lower_bound(result.surfel.begin(), result.surfel.end(), chosen[cell]) -
+        result.surfel.begin()));
   }
-  result.triangle = triangles_between(surface, cells, position);
+  result.triangle = result.shown(surface.triangle);
   return result;
 }
 

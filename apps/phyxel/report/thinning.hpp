@@ -13,6 +13,11 @@ namespace phyxel::app {
 struct ThinnedSurface {
   std::vector<std::size_t> surfel;  ///< Numbers in the surface, ascending.
   std::vector<Triangle> triangle;   ///< Of positions in `surfel`.
+  /// Position in `surfel` of the one that represents each surfel; empty if each represents itself.
+  std::vector<std::size_t> representative;
+
+  /// Triangles of the surface as of `triangle`.
+  std::vector<Triangle> shown(const std::vector<Triangle>& of_surface) const;
 };
 
 /// A part of a surface's surfels: one of each body in each cell of a grid, the nearest to the mean
@@ -21,5 +26,11 @@ struct ThinnedSurface {
 /// @param most largest number of surfels, at least the number of bodies; a surface that has no more
 ///   is returned as it is
 ThinnedSurface thinned(const FrameData& surface, std::size_t most);
+
+/// Puts the triangles of a surface in the order in which later frames lack them, those that none
+/// lacks first.
+/// @param of_frames the triangles that each frame has. @returns how many each frame has
+std::vector<std::size_t> sort_by_last_frame(std::vector<Triangle>& triangles,
+                                            std::vector<std::vector<Triangle>> of_frames);
 
 }  // namespace phyxel::app

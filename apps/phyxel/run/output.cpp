@@ -55,6 +55,8 @@ void Run::write_frame(const std::shared_ptr<const GoodState>& good) {
     backend_->advect_surfels(moment->surfels);
     frame.surfels = &moment->surfels;
     moment->optional.push_back(Quantity::surfel_position);
+    moment->triangles = uncut_triangles(model(), shared_.triangles(), good->state.broken);
+    if (moment->triangles) frame.triangles = &*moment->triangles;
   }
   const std::vector<Quantity>& found = fields_.quantities();
   moment->optional.insert(moment->optional.end(), found.begin(), found.end());

@@ -181,7 +181,7 @@ class SimulationBase:
         """At rest [m^3], (n,)"""
     @property
     def triangles(self) -> NDArray[Any]:
-        """Of the surface, (t, 3)."""
+        """Of the surface, (t, 3): those that no crack crosses now."""
     @property
     def neighbours(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Lists of neighbours as (offsets, indices): those of i are

@@ -18,6 +18,7 @@
 #include "phyxel/mesh.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/neighbourhood.hpp"
+#include "phyxel/open_surface.hpp"
 #include "phyxel/output_fields.hpp"
 #include "phyxel/point_fields.hpp"
 #include "phyxel/probes.hpp"

@@ -36,6 +36,8 @@ struct Readings {
 struct Frame {
   const State* state = nullptr;
   const SurfelState* surfels = nullptr;  ///< Surfels; null without a surface family.
+  /// The triangles of the surface that no crack crosses; null: all.
+  const std::vector<Triangle>* triangles = nullptr;
   Diagnostics diagnostics;
   Readings readings;
   FieldValues fields;  ///< Computed fields (`find_fields`); others are not written.
@@ -52,7 +54,9 @@ class FrameSource : public ChunkedSource {
       : ChunkedSource(length), model_(model), frame_(frame) {}
   bool has(Quantity quantity) const override;
   std::span<const double> values(Quantity quantity, Index begin, Index end) override;
-  std::span<const Triangle> triangles() const override { return model_.surfels.triangle; }
+  std::span<const Triangle> triangles() const override {
+    return frame_.triangles ? *frame_.triangles : model_.surfels.triangle;
+  }
 
  private:
   const Model& model_;

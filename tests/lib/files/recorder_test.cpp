@@ -437,5 +437,43 @@ TEST_F(Recording, TheSingleFileHoldsEveryStep) {
   EXPECT_EQ(code, 0);
 }
 
+/// Frames of a surface that cracks open have triangles of their own, and so have the steps of the
+/// single file: each is a part of it.
+TEST_F(Recording, TheSingleFileHoldsTheTrianglesOfEveryStep) {
+  const std::vector<Triangle> all = model_.surfels.triangle;
+  const std::vector<std::vector<Triangle>> of_frames{all, {all[1], all[3]}, {}, {all[3]}};
+  {
+    Recorder recorder(model_, scene_, false);
+    for (int k = 0; k < 4; ++k) {
+      const test::TwoBodiesFrame made(model_, k);
+      Frame frame = made.frame();
+      if (k > 0) frame.triangles = &of_frames[static_cast<std::size_t>(k)];
+      recorder.write(frame);
+    }
+  }
+  const fs::path series = folder_ / "out" / "surface.hdf.series", out = folder_ / "surface.vtkhdf";
+  export_single(series, out, false);
+  const Hdf5Reader in(out);
+  const auto numbers = [&](const char* name) {
+    return in.array<std::int64_t>(std::string("/VTKHDF/") + name);
+  };
+  using Numbers = std::vector<std::int64_t>;
+  EXPECT_EQ(numbers("NumberOfPoints"), Numbers(4, 4));
+  EXPECT_EQ(numbers("NumberOfCells"), (Numbers{4, 2, 0, 1}));
+  EXPECT_EQ(numbers("NumberOfConnectivityIds"), (Numbers{12, 6, 0, 3}));
+  EXPECT_EQ(numbers("Offsets"), (Numbers{0, 3, 6, 9, 12, 0, 3, 6, 0, 0, 3}));
+  EXPECT_EQ(numbers("Steps/PartOffsets"), (Numbers{0, 1, 2, 3}));
+  EXPECT_EQ(in.array<std::int64_t>("/VTKHDF/Steps/CellOffsets", 1), (Numbers{0, 4, 6, 6}));
+  EXPECT_EQ(in.array<std::int64_t>("/VTKHDF/Steps/ConnectivityIdOffsets", 1),
+            (Numbers{0, 12, 18, 18}));
+  EXPECT_EQ(in.array<std::uint8_t>("/VTKHDF/Types"), std::vector<std::uint8_t>(7, 5));
+  Numbers corners;
+  for (std::size_t k = 0; k < 4; ++k) {
+    EXPECT_EQ(read_frame(read_series(series)[k].file).triangle, of_frames[k]);
+    for (const Triangle& t : of_frames[k]) corners.insert(corners.end(), t.begin(), t.end());
+  }
+  EXPECT_EQ(numbers("Connectivity"), corners);
+}
+
 }  // namespace
 }  // namespace phyxel

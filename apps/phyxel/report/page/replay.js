@@ -37,10 +37,21 @@ function fieldOf(frame, family, number) {
   return made;
 }
 
+/// The phyxels of a frame that have lost pairs, which are seen where the surface has opened.
+function tornOf(frame) {
+  const number = data.fields.findIndex(f => f.name === 'broken share');
+  if (number < 0 || !frame.phyxels) return new Uint32Array(0);
+  const broken = frame.phyxels.fields[number];
+  return frame.torn ??= Uint32Array.from([...broken.keys()].filter(i => broken[i] > 0));
+}
+
+/// How many numbers of `triangles` a frame draws: those that no crack crosses come first.
+const cornersOf = number => data.uncut ? 3 * data.uncut[number] : triangles.length;
+
 /// Of the surface, area-weighted; in bytes for the GPU.
-function normalsOf(points) {
+function normalsOf(points, corners) {
   const n = new Float32Array(points.length), [sx, sy, sz] = data.scale;
-  for (let t = 0; t < triangles.length; t += 3) {
+  for (let t = 0; t < corners; t += 3) {
     const a = 3 * triangles[t], b = 3 * triangles[t + 1], c = 3 * triangles[t + 2];
     const ux = (points[b] - points[a]) * sx, uy = (points[b + 1] - points[a + 1]) * sy, uz = (points[b + 2] - points[a + 2]) * sz;
     const vx = (points[c] - points[a]) * sx, vy = (points[c + 1] - points[a + 1]) * sy, vz = (points[c + 2] - points[a + 2]) * sz;
@@ -67,11 +78,13 @@ const source = {
   ballMotion: quantised,
   scale: sides,
   low: data.low,
-  prepare() { buffers = {surfels: [0, 1, 2].map(() => gl.createBuffer()), phyxels: [0, 1].map(() => gl.createBuffer())}; },
+  prepare() { buffers = {surfels: [0, 1, 2].map(() => gl.createBuffer()), phyxels: [0, 1].map(() => gl.createBuffer()), torn: gl.createBuffer()}; },
   frame() { return frameOf(shown.frame); },
   clock(frame) { return `t = ${frames[frame.number].toFixed(data.decimals)} s`; },
   span,
   upload,
+  corners(frame) { return cornersOf(frame.number); },
+  torn(frame) { return {count: tornOf(frame).length, buffer: buffers.torn}; },
   bindSurface() {
     attribute(0, buffers.surfels[0], 3, gl.UNSIGNED_SHORT, true);
     attribute(1, buffers.surfels[1], 1, gl.UNSIGNED_SHORT, true);
@@ -94,7 +107,9 @@ function upload(frame) {
     fill(buffers[family][0], f.points);
     fill(buffers[family][1], shown.field < 0 ? bodiesOf(family) : fieldOf(frame, family, shown.field));
   }
-  if (frame.surfels) fill(buffers.surfels[2], frame.surfels.normals ??= normalsOf(frame.surfels.points));
+  if (frame.surfels) fill(buffers.surfels[2], frame.surfels.normals ??= normalsOf(frame.surfels.points, cornersOf(frame.number)));
+  gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.torn);
+  gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, tornOf(frame), gl.DYNAMIC_DRAW);
   uploaded = key;
 }
 
@@ -135,7 +150,7 @@ function addCharts() {
   };
   // All parts of the total: their sum is constant where the total is.
   const lost = {contact_energy: 'springs of contact', friction_heat: 'heat of friction', impact_loss: 'lost in impacts',
-                other_contact_loss: 'lost otherwise in contact', plastic_work: 'plastic work', viscous_work: 'viscous work'};
+                other_contact_loss: 'lost otherwise in contact', plastic_work: 'plastic work', viscous_work: 'viscous work', fracture_energy: 'taken by fracture'};
   const parts = ['kinetic_energy', 'strain_energy', 'volume_energy', 'hourglass_energy', 'gravity_energy', 'load_energy'];
   chart('Energy', 'energy [J]', [...parts, ...Object.keys(lost), 'total_energy'], n => lost[n] ?? n.replace('_energy', ''));
   chart('Momentum', 'momentum [kg m/s]', ['momentum_x', 'momentum_y', 'momentum_z'], n => n.slice(-1));

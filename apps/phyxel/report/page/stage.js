@@ -192,13 +192,15 @@ function draw() {
   const drawSurface = at => {
     source.bindSurface(at);
     gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, cornerBuffer);
-    gl.drawElements(gl.TRIANGLES, triangles.length, gl.UNSIGNED_INT, 0);
+    gl.drawElements(gl.TRIANGLES, source.corners?.(frame) ?? triangles.length, gl.UNSIGNED_INT, 0);
   };
-  const drawBalls = (at, size) => {
+  const drawBalls = (at, size, some) => {
     gl.disableVertexAttribArray(2);
     gl.uniform1f(at.ball, size);
     source.bindBalls(at);
-    gl.drawArrays(gl.POINTS, 0, data.phyxels);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, some?.buffer ?? null);
+    if (some) gl.drawElements(gl.POINTS, some.count, gl.UNSIGNED_INT, 0);
+    else gl.drawArrays(gl.POINTS, 0, data.phyxels);
   };
   const surface = shown.surface && frame.surfels, balls = shown.phyxels && frame.phyxels;
   if (scene) {
@@ -216,6 +218,8 @@ function draw() {
     bindShadows(at, scene);
     drawSurface(at);
   }
+  const torn = source.torn?.(frame);
+  if (surface && torn?.count) drawBalls(use(eye, programs.balls), data.spacing * 0.84 * focal * height / 2, torn);
   if (balls) {
     const at = use(eye, programs.balls);
     drawBalls(at, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
