@@ -141,6 +141,21 @@ void add_simulation(py::module_& module) {
                                   taken(std::move(surfels.normal)));
           },
           "Deformed surfels [m] and their normals, both (m, 3), copies.")
+      .def(
+          "surface_fields",
+          [](Simulation& s, const std::vector<std::string>& names) {
+            py::dict fields;
+            for (Simulation::SurfaceField& field : s.surface_fields(names)) {
+              py::array values = taken(std::move(field.values));
+              if (field.width > 1) values = values.reshape({py::ssize_t{-1}, field.width});
+              fields[py::str(field.name)] = values;
+            }
+            return fields;
+          },
+          "names"_a,
+          "Fields on the deformed surfels by the names of output.fields, as frames of the surface\n"
+          "have them: {name: array}, (m,), (m, 3) or (m, 6), copies; \"history\" is all that the\n"
+          "materials remember.")
       .def("set_state", &Simulation::set_state, "displacement"_a = py::none(),
            "velocity"_a = py::none(), "history"_a = py::none(),
            "Replaces displacements [m], velocities [m/s], both (n, 3), or history, {name: (n,)};\n"

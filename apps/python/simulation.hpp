@@ -1,6 +1,8 @@
 /// A scene that steps, under Python's control.
 #pragma once
 
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <chrono>
 #include <mutex>
@@ -232,6 +234,55 @@ class Simulation {
     return surfels;
   }
 
+  /// A field on the surfels.
+  struct SurfaceField {
+    std::string name;
+    std::vector<double> values;
+    py::ssize_t width;
+  };
+  /// Fields on the surfels, as frames of the surface have them. "history" is all of its columns.
+  /// @throws InputError for a name that frames of the surface lack
+  std::vector<SurfaceField> surface_fields(const std::vector<std::string>& names) {
+    const auto turn = my_turn();
+    const py::gil_scoped_release others;
+    std::vector<std::pair<std::string, Quantity>> all{{"displacement", Quantity::displacement},
+                                                      {"velocity", Quantity::velocity}};
+    for (const PointField& field : point_fields()) all.emplace_back(field.name, field.quantity);
+    const std::size_t computed = all.size();
+    for (const std::string& name : history_columns(model_)) {
+      all.emplace_back(name, history_quantity(all.size() - computed));
+    }
+    OutputRequest output;
+    output.fields.clear();
+    std::vector<std::pair<std::string, Quantity>> chosen;
+    for (const std::string& name : names) {
+      const bool is_history_name = name == "history";
+      const std::size_t before = chosen.size();
+      for (std::size_t k = 0; k < all.size(); ++k) {
+        if (all[k].first == name || (is_history_name && k >= computed)) chosen.push_back(all[k]);
+      }
+      if (chosen.size() == before && !is_history_name) throw unknown_field(name, all);
+      const bool is_column = chosen.size() > before && is_history(chosen.back().second);
+      output.fields.push_back(is_column ? "history" : name);
+    }
+    if (model_.surfels.position.empty()) {
+      throw InputError("surface_fields: the bodies have no surface; allowed: bodies with one");
+    }
+    if (!on_surface_ || on_surface_->first != output.fields) {
+      on_surface_.emplace(output.fields, std::make_unique<const OutputFields>(model_, output));
+    }
+    SurfelState surfels;
+    backend_->advect_surfels(surfels);
+    const State state = solver_->state();
+    FieldValues found = on_surface_->second->find(*backend_, state, &surfels, recovery());
+    std::vector<SurfaceField> fields;
+    for (const auto& [name, quantity] : chosen) {
+      fields.push_back(
+          {name, found.at(on_surface(quantity)), static_cast<py::ssize_t>(width_of(quantity))});
+    }
+    return fields;
+  }
+
   Live live(const py::handle& self) const {
     const auto view_now = backend_->view();
     if (!view_now) {
@@ -262,6 +313,14 @@ class Simulation {
 
  private:
   static constexpr std::int64_t watch_interval = 250;
+
+  static InputError unknown_field(const std::string& name,
+                                  const std::vector<std::pair<std::string, Quantity>>& all) {
+    std::vector<std::string> names;
+    for (const auto& [known, quantity] : all) names.push_back(known);
+    return InputError(fmt::format("surface_fields: \"{}\" found; allowed: {}, history", name,
+                                  fmt::join(names, ", ")));
+  }
 
   /// Stepping leaves Python's lock to other threads, which then must leave this alone.
   std::unique_lock<std::mutex> my_turn() const {
@@ -391,6 +450,9 @@ class Simulation {
   std::unique_ptr<Recorder> recorder_;
   std::unique_ptr<const Recovery> recovery_;
   std::optional<OutputFields> fields_;
+  // Fields that were last asked for on the surface, and what finds them.
+  std::optional<std::pair<std::vector<std::string>, std::unique_ptr<const OutputFields>>>
+      on_surface_;
   std::optional<Probes> probes_;
   std::int64_t looked_ = 0;
   RunProgress told_;

@@ -238,8 +238,8 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
   const auto vectors = [&](const char* path, bool as_float, Quantity quantity) {
     write_later(out, {path, as_float, static_cast<Index>(points), {quantity}}, values);
   };
-  vectors("/VTKHDF/Points", scene.solver.precision == Precision::single && floats_do,
-          Quantity::surfel_position);
+  const bool in_float = scene.solver.precision == Precision::single;
+  vectors("/VTKHDF/Points", in_float && floats_do, Quantity::surfel_position);
   out.later<std::uint8_t>("/VTKHDF/Types", cells, 0, stretch,
                           [](std::size_t, std::span<std::uint8_t> types) {
                             std::fill(types.begin(), types.end(), vtk_triangle);
@@ -257,10 +257,11 @@ void write_surface_frame(const std::filesystem::path& file, const Model& model, 
     if (!values.has(on_surface(quantity))) return;
     vectors((std::string("/VTKHDF/PointData/") + name).c_str(), as_float, on_surface(quantity));
   };
-  field("displacement", scene.solver.precision == Precision::single, Quantity::displacement);
+  field("displacement", in_float, Quantity::displacement);
+  field("velocity", in_float, Quantity::velocity);
   for_each_found_field(model, scene,
                        [&](const char* name, Quantity quantity) { field(name, true, quantity); });
-  if (ends.surfels.size() > 1) {
+  if (ends.surfels.size() > 1 || scene.output.wants("body")) {
     out.later<Index>("/VTKHDF/PointData/body", rows, 0, stretch, bodies(ends.surfels));
   }
   write_metadata(out, scene, diagnostics, floats_do);

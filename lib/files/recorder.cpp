@@ -221,8 +221,13 @@ void Recorder::check_space(std::int64_t frames_before) const {
              (3 * position(Points::phyxels) + 3 * scalar * count(scene_.output.fields.size()) + 8);
   }
   if (writes_surface_) {
-    // A closed surface has twice as many triangles as vertices.
-    frame += model_.global_surfel_count() * (3 * (position(Points::surfels) + 4) + 2 * 33);
+    // A closed surface has twice as many triangles as vertices. Masses and volumes are not on it.
+    const auto& fields = scene_.output.fields;
+    const auto held = std::count_if(fields.begin(), fields.end(), [](const std::string& name) {
+      return name != "mass" && name != "volume";
+    });
+    frame += model_.global_surfel_count() * (3 * (position(Points::surfels) + 4) +
+                                             3 * scalar * static_cast<double>(held) + 2 * 33);
   }
   const double frames = scene_.output.frames_per_second > 0
                             ? std::floor(scene_.time.end * scene_.output.frames_per_second) + 1

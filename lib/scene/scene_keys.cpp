@@ -44,7 +44,7 @@ std::string field_meanings() {
       "What each phyxel carries beside its position: displacement [m], velocity [m/s], mass [kg], volume "
       "[m^3], number of its body, and what its material remembers";
   for (const PointField& field : point_fields()) all += fmt::format("; `{}`: {}", field.name, field.meaning);
-  return all + ". The surface has them, too, but for velocity, mass and volume.";
+  return all + ". The points of the surface have them, too, from the phyxels around them, but for mass and volume.";
 }
 
 /// The parameters that laws have beside `young` and `poisson`, as keys of a section. Laws that share

@@ -175,6 +175,14 @@ bool contains(std::span<const Quantity> list, Quantity quantity) {
   return std::find(list.begin(), list.end(), quantity) != list.end();
 }
 
+/// The components of vectors, shape [n, 3].
+std::vector<double> flat(const std::vector<Vec3d>& vectors) {
+  std::vector<double> numbers;
+  numbers.reserve(3 * vectors.size());
+  for (const Vec3d& v : vectors) numbers.insert(numbers.end(), {v.x, v.y, v.z});
+  return numbers;
+}
+
 /// Von Mises or principal stresses of stress tensors. @param stress shape [n, 6]
 std::vector<double> of_stress(Quantity quantity, const std::vector<double>& stress) {
   const std::size_t width = width_of(quantity);
@@ -202,6 +210,7 @@ OutputFields::OutputFields(const Model& model, const OutputRequest& output)
   has_displacement_ = output.wants("displacement");
   if (output.wants("history")) columns_ = history_columns(model).size();
   if (has_displacement_) quantities_.push_back(on_surface(Quantity::displacement));
+  if (output.wants("velocity")) quantities_.push_back(on_surface(Quantity::velocity));
   for (const Quantity q : wanted_) quantities_.push_back(on_surface(q));
   for (std::size_t k = 0; k < columns_; ++k) {
     quantities_.push_back(on_surface(history_quantity(k)));
@@ -219,15 +228,17 @@ FieldValues OutputFields::find(Backend& backend, const State& state, const Surfe
   FieldValues found = find_fields(model_, backend, needed, recovery);
   if (!surfels) return found;
   if (has_displacement_) {
-    std::vector<double>& displacement = found[on_surface(Quantity::displacement)];
-    for (std::size_t s = 0; s < surfels->position.size(); ++s) {
-      const Vec3d u = surfels->position[s] - model_.surfels.position[s];
-      displacement.insert(displacement.end(), {u.x, u.y, u.z});
-    }
+    std::vector<Vec3d> way = surfels->position;
+    for (std::size_t s = 0; s < way.size(); ++s) way[s] -= model_.surfels.position[s];
+    found[on_surface(Quantity::displacement)] = flat(way);
   }
-  if (wanted_.empty() && columns_ == 0) return found;
+  const bool has_velocity = contains(quantities_, on_surface(Quantity::velocity));
+  if (wanted_.empty() && columns_ == 0 && !has_velocity) return found;
   if (!surface_) surface_ = std::make_unique<const SurfaceFit>(model_);
   const auto cut = surface_->cut_by({model_, state.broken});
+  if (has_velocity) {
+    found[on_surface(Quantity::velocity)] = surface_->fitted<3>(flat(state.velocity), cut);
+  }
   std::vector<double> stress;
   if (contains(needed, Quantity::stress)) {
     stress = surface_->fitted<6>(found[Quantity::stress], cut);

@@ -153,6 +153,16 @@ TEST_F(ColouredPictures, ShowAFieldOfThePhyxelsOnTheSurface) {
   EXPECT_NE(coloured("1,3", "linear"), coloured("1,3", "log", "log"));
 }
 
+TEST_F(ColouredPictures, SurfacesHaveTheFieldsOfTheirScene) {
+  const FrameData surface = read_frame(folder_ / "out" / "surface_000001.hdf", true);
+  const std::vector<double>& velocity = surface.field.at("velocity");
+  ASSERT_EQ(velocity.size(), 3 * surface.point.size());
+  for (std::size_t k = 0; k < velocity.size(); ++k) {
+    EXPECT_NEAR(velocity[k], k % 3 == 2 ? 2 : 0, 1e-6);
+  }
+  EXPECT_EQ(surface.field.at("displacement").size(), velocity.size());
+}
+
 TEST_F(ColouredPictures, HaveAFloorWithShadowsIfTheCameraLooksDown) {
   const auto drawn = [&](const char* view, bool floor) {
     std::vector<std::string> words{"render",  "out",      "--frames", "1",     "--width",

@@ -291,7 +291,8 @@ TEST_F(Reports, OneFamilyAloneIsShown) {
   ASSERT_EQ(run({"report", "out/surface.hdf.series", "-o", "surface.html"}).code, 0);
   const json surface = data_of(text_of(folder_ / "surface.html"));
   EXPECT_EQ(surface["phyxels"], 0);
-  EXPECT_EQ(surface["fields"].size(), 1u);
+  ASSERT_EQ(surface["fields"].size(), 2u);
+  EXPECT_EQ(surface["fields"][1]["name"], "speed");
   ASSERT_EQ(run({"report", "out/phyxels_000003.hdf"}).code, 0);
   const json one = data_of(text_of(folder_ / "out" / "phyxels_000003.html"));
   EXPECT_EQ(one["surfels"], 0);

@@ -362,3 +362,24 @@ def test_surfaces_follow():
     assert np.allclose(points, BEAM.surfels + [s.time, 0, 0], atol=1e-12)
     assert np.allclose(normals, BEAM.normals, atol=1e-9)
     assert s.triangles.shape == BEAM.triangles.shape
+
+
+def test_fields_are_on_the_surface(tmp_path):
+    s = simulation(body={"fixed": [{"region": "x-"}], "velocity": [0, 0, 0.1]}, time={"end": 0.02},
+                   output={"frames_per_second": 50, "fields": ["displacement", "velocity", "von_mises"]})
+    s.record(tmp_path / "out")
+    s.run()
+    found = s.surface_fields(["velocity", "displacement", "von_mises"])
+    points, _ = s.surface()
+    assert found["velocity"].shape == points.shape and found["von_mises"].shape == (len(points),)
+    assert np.allclose(BEAM.surfels + found["displacement"], points, atol=1e-12)
+    # Surfels are on phyxels or near them, and the beam swings about its clamp.
+    nearest = [np.argmin(np.linalg.norm(s.rest - x, axis=1)) for x in BEAM.surfels]
+    assert np.allclose(found["velocity"], s.velocity[nearest], atol=0.3 * abs(s.velocity).max())
+    assert abs(found["velocity"][:, 2]).max() > 0.5 * abs(s.velocity).max()
+    written = phyxel.Trajectory(tmp_path / "out").surface[-1].fields
+    for name, values in found.items():
+        assert np.allclose(written[name], values, rtol=1e-6, atol=1e-6 * abs(values).max())
+    assert s.surface_fields(["history"]) == {}
+    with pytest.raises(phyxel.InputError, match='"mass" found; allowed: displacement, velocity, von_mises'):
+        s.surface_fields(["mass"])

@@ -149,6 +149,10 @@ class SimulationBase:
         """What the scene's probes read now: {name: dict}, each as of at()."""
     def surface(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Deformed surfels [m] and their normals, both (m, 3), copies."""
+    def surface_fields(self, names: list[str]) -> dict[str, NDArray[Any]]:
+        """Fields on the deformed surfels by the names of output.fields, as frames of the surface
+        have them: {name: array}, (m,), (m, 3) or (m, 6), copies; "history" is all that the
+        materials remember."""
     def set_state(self, displacement: ArrayLike | None = None, velocity: ArrayLike | None = None, history: Mapping[str, ArrayLike] | None = None) -> None:
         """Replaces displacements [m], velocities [m/s], both (n, 3), or history, {name: (n,)};
         time goes on. An empty history is the virgin material."""

@@ -26,10 +26,10 @@ class OutputFields {
   /// material as the nearest, within the range of their values, so that rough fields cannot
   /// overshoot; if they all lie below it, as those of a lattice of cells do, the range is wider in
   /// proportion to their depth. Its principal stresses are those of the stress so found; so is von
-  /// Mises', within the range of the phyxels' own. The values of "boundary" and
-  /// "fragment" are those of the nearest phyxel. What materials remember is that of the state. The
-  /// displacement of a surfel is the way from its place at rest. A surfel beside a crack has the
-  /// weighted mean of the phyxels on its side. Collective on a share.
+  /// Mises', within the range of the phyxels' own. The values of "boundary" and "fragment" are
+  /// those of the nearest phyxel. Velocities and histories are those of the state. The displacement
+  /// of a surfel is the way from its place at rest. A surfel beside a crack has the weighted mean of
+  /// the phyxels on its side. Collective on a share.
   /// @param state of the backend, with its history variables and the broken pairs of all ranks
   /// @param surfels the present surface, or null if it is not written
   /// @param recovery as of `find_fields`

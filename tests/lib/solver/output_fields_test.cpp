@@ -50,8 +50,8 @@ TEST(OutputFields, OfSurfelsAreThoseThatTheOutputNames) {
   const Model model = build_model(one_body(), std::span(&ball(), 1));
   const OutputFields fields(model, output_of({"velocity", "von_mises", "boundary", "mass"}));
   EXPECT_THAT(fields.quantities(),
-              ElementsAre(Quantity::von_mises, Quantity::boundary, on_surface(Quantity::von_mises),
-                          on_surface(Quantity::boundary)));
+              ElementsAre(Quantity::von_mises, Quantity::boundary, on_surface(Quantity::velocity),
+                          on_surface(Quantity::von_mises), on_surface(Quantity::boundary)));
   OutputRequest no_surface = output_of({"displacement", "von_mises"});
   EXPECT_THAT(OutputFields(model, no_surface).quantities(),
               ElementsAre(Quantity::von_mises, on_surface(Quantity::displacement),
@@ -86,6 +86,28 @@ TEST(OutputFields, OfSurfelsFollowAUniformDeformation) {
     EXPECT_LE(norm(Vec3d{way[3 * s], way[3 * s + 1], way[3 * s + 2]} -
                    stretched(model.surfels.position[s])),
               1e-12);
+  }
+}
+
+/// Surfels of a body that turns and stretches move as their places do. Their velocities are within
+/// the range of those around them, which cuts off half a spacing of the ball at its poles.
+TEST(OutputFields, OfSurfelsHaveVelocitiesOfTheirPlaces) {
+  const Model model = build_model(one_body(), std::span(&ball(), 1));
+  const auto velocity_at = [](Vec3d x) { return Vec3d{-2 * x.y, 2 * x.x, 1 + x.z}; };
+  const auto backend = make_test_backend(model, Precision::double_);
+  State state = state_of(std::vector<Vec3d>(model.position.size()));
+  for (Index i = 0; i < model.size(); ++i) state.velocity[i] = velocity_at(model.position[i]);
+  backend->upload(state);
+  SurfelState surfels;
+  backend->advect_surfels(surfels);
+  const FieldValues found =
+      OutputFields(model, output_of({"velocity"})).find(*backend, state, &surfels, nullptr);
+  const std::vector<double>& velocity = found.at(on_surface(Quantity::velocity));
+  ASSERT_EQ(velocity.size(), 3 * model.surfels.position.size());
+  for (std::size_t s = 0; s < model.surfels.position.size(); ++s) {
+    const Vec3d right = velocity_at(model.surfels.position[s]);
+    const Vec3d here{velocity[3 * s], velocity[3 * s + 1], velocity[3 * s + 2]};
+    EXPECT_LT(norm(here - right), 0.02);
   }
 }
 
