@@ -84,10 +84,10 @@ std::vector<std::size_t> representatives(const std::vector<Vec3d>& point, const 
 std::vector<Triangle> ThinnedSurface::shown(const std::vector<Triangle>& of_surface) const {
   if (representative.empty()) return of_surface;
   std::vector<Triangle> kept;
-  for (const Triangle& triangle : of_surface) {
+  for (const Triangle& whole : of_surface) {
     Triangle merged;
     for (std::size_t c = 0; c < 3; ++c) {
-      merged[c] = static_cast<Index>(representative[static_cast<std::size_t>(triangle[c])]);
+      merged[c] = static_cast<Index>(representative[static_cast<std::size_t>(whole[c])]);
     }
     if (merged[0] == merged[1] || merged[1] == merged[2] || merged[2] == merged[0]) continue;
     std::rotate(merged.begin(), std::min_element(merged.begin(), merged.end()), merged.end());
