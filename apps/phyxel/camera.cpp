@@ -10,8 +10,9 @@
 namespace phyxel::app {
 namespace {
 
-constexpr double field_of_view = 30 * std::numbers::pi / 180;  // along the shorter side [rad]
 constexpr double filled = 0.86;  // largest share of the image that the points take along each side
+
+constexpr double radians(double degrees) { return degrees * std::numbers::pi / 180; }
 
 }  // namespace
 
@@ -22,7 +23,7 @@ Camera::Place Camera::project(Vec3d point) const {
           depth};
 }
 
-CameraFit::CameraFit(int width, int height, Vec3d view, Vec3d up) {
+CameraFit::CameraFit(int width, int height, Vec3d view, Vec3d up, double field_of_view) {
   if (std::min(width, height) < 16 || std::max(width, height) > 16384) {
     throw InputError(fmt::format("picture of {} x {} pixels: allowed from 16 x 16 to 16384 x 16384",
                                  width, height));
@@ -31,6 +32,9 @@ CameraFit::CameraFit(int width, int height, Vec3d view, Vec3d up) {
     throw InputError(fmt::format(
         "view [{}, {}, {}] with up [{}, {}, {}]: allowed are finite vectors, view not zero", view.x,
         view.y, view.z, up.x, up.y, up.z));
+  }
+  if (!(field_of_view >= 1 && field_of_view <= 150)) {
+    throw InputError(fmt::format("field of view {} degrees: allowed from 1 to 150", field_of_view));
   }
   camera_.width = width;
   camera_.height = height;
@@ -42,15 +46,16 @@ CameraFit::CameraFit(int width, int height, Vec3d view, Vec3d up) {
     break;
   }
   camera_.up = cross(camera_.right, camera_.forward);
-  camera_.focal = 0.5 * std::min(width, height) / std::tan(0.5 * field_of_view);
+  camera_.focal = 0.5 * std::min(width, height) / std::tan(0.5 * radians(field_of_view));
   slope_x_ = filled * 0.5 * width / camera_.focal;
   slope_y_ = filled * 0.5 * height / camera_.focal;
 }
 
 // A point (x, y, z) in the camera's axes is visible from an eye at e if |x - e_x| <= s_x (z - e_z),
 // and likewise for y. Each point gives four half-spaces for the eye; the tightest are kept.
-void CameraFit::include(std::span<const Vec3d> points) {
-  for (const Vec3d& p : points) {
+void CameraFit::include(std::span<const Vec3d> points, Vec3d way) {
+  for (const Vec3d& point : points) {
+    const Vec3d p = point - way;
     if (!is_finite(p)) continue;
     const double x = dot(p, camera_.right), y = dot(p, camera_.up), z = dot(p, camera_.forward);
     left_ = std::max(left_, x - slope_x_ * z);
@@ -92,16 +97,13 @@ Camera CameraFit::camera() const {
   return fitted;
 }
 
-std::vector<Camera> orbit(const Camera& start, Vec3d up, Vec3d middle,
-                          std::span<const Vec3d> points, double degrees, std::size_t count) {
+std::vector<Camera> turned_about(const Camera& start, Vec3d up, Vec3d middle, double degrees,
+                                 std::size_t count) {
   const Vec3d axis = norm(up) > 0 ? normalised(up) : start.up;
-  const double slope_x = filled * 0.5 * start.width / start.focal,
-               slope_y = filled * 0.5 * start.height / start.focal;
   std::vector<Camera> cameras(count, start);
-  double distance = 0;
-  for (std::size_t k = 0; k < count; ++k) {
-    const double share = count > 1 ? static_cast<double>(k) / static_cast<double>(count - 1) : 0;
-    const double angle = share * degrees * std::numbers::pi / 180;
+  for (std::size_t k = 1; k < count; ++k) {
+    const double share = static_cast<double>(k) / static_cast<double>(count - 1);
+    const double angle = share * radians(degrees);
     const auto turned = [&](Vec3d v) {  // Rodrigues' formula
       return std::cos(angle) * v + std::sin(angle) * cross(axis, v) +
              (1 - std::cos(angle)) * dot(axis, v) * axis;
@@ -110,6 +112,18 @@ std::vector<Camera> orbit(const Camera& start, Vec3d up, Vec3d middle,
     camera.right = turned(start.right);
     camera.up = turned(start.up);
     camera.forward = turned(start.forward);
+    camera.eye = middle + turned(start.eye - middle);
+  }
+  return cameras;
+}
+
+std::vector<Camera> orbit(const Camera& start, Vec3d up, Vec3d middle,
+                          std::span<const Vec3d> points, double degrees, std::size_t count) {
+  const double slope_x = filled * 0.5 * start.width / start.focal,
+               slope_y = filled * 0.5 * start.height / start.focal;
+  std::vector<Camera> cameras = turned_about(start, up, middle, degrees, count);
+  double distance = 0;
+  for (const Camera& camera : cameras) {
     for (const Vec3d& point : points) {
       const Vec3d d = point - middle;
       if (!is_finite(d)) continue;

@@ -31,12 +31,13 @@ class CameraFit {
  public:
   /// @param up need not be orthogonal to `view`; if it is parallel to it or zero, a coordinate axis
   ///   replaces it
-  /// @throws InputError for a zero or non-finite `view`, or an image size below 16 or above 16384
-  ///   pixels
-  CameraFit(int width, int height, Vec3d view, Vec3d up);
+  /// @param field_of_view along the shorter side of the image [degrees]
+  /// @throws InputError for a zero or non-finite `view`, an image size below 16 or above 16384
+  ///   pixels, or a field of view outside 1 to 150 degrees
+  CameraFit(int width, int height, Vec3d view, Vec3d up, double field_of_view = 30);
 
-  /// Adds points. Non-finite points are skipped.
-  void include(std::span<const Vec3d> points);
+  /// Adds points, moved by `-way` [m]. Non-finite points are skipped.
+  void include(std::span<const Vec3d> points, Vec3d way = {});
   bool empty() const { return !(nearest_ <= farthest_); }
   double extent() const;  ///< Largest extent of the points along the camera's axes [m].
   Vec3d middle() const;   ///< Of the box around the points along the camera's axes [m].
@@ -57,5 +58,9 @@ class CameraFit {
 /// @param degrees angle between the first and the last camera, to the right as the viewer sees it
 std::vector<Camera> orbit(const Camera& start, Vec3d up, Vec3d middle,
                           std::span<const Vec3d> points, double degrees, std::size_t count);
+
+/// Cameras that go round a point with the axis `up`, as far from it as the first one.
+std::vector<Camera> turned_about(const Camera& start, Vec3d up, Vec3d middle, double degrees,
+                                 std::size_t count);
 
 }  // namespace phyxel::app

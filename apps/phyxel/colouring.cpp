@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "label.hpp"
+#include "phyxel/neighbourhood.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -125,6 +126,33 @@ std::vector<double> shown_values(const FrameData* surface, const FrameData* phyx
     shown.push_back(sum / 255);
   }
   return shown;
+}
+
+std::vector<double> inner_values(const FrameData& phyxels, Index body, const std::string& field,
+                                 const std::vector<Vec3d>& places, double reach) {
+  const auto all = field_values(phyxels, field);
+  if (!all) return {};
+  std::vector<Vec3d> point;
+  std::vector<double> values;
+  for (std::size_t i = 0; i < phyxels.point.size(); ++i) {
+    if (phyxels.body.size() == phyxels.point.size() && phyxels.body[i] != body) continue;
+    if (!std::isfinite((*all)[i])) continue;
+    point.push_back(phyxels.point[i]);
+    values.push_back((*all)[i]);
+  }
+  if (point.empty()) return {};
+  const Csr rows = phyxels_near(places, point, std::vector<double>(point.size(), reach));
+  std::vector<double> found;
+  for (Index k = 0; k < rows.rows(); ++k) {
+    double sum = 0, weights = 0;
+    for (const Index i : rows.row(k)) {
+      const double weight = carrier_weight(norm(point[i] - places[k]) / reach);
+      sum += weight * values[i];
+      weights += weight;
+    }
+    found.push_back(sum / weights);
+  }
+  return found;
 }
 
 Colour field_colour(double value, const Colouring& colouring) {

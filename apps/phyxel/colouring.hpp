@@ -38,6 +38,12 @@ std::optional<std::vector<double>> field_values(const FrameData& frame, const st
 std::vector<double> shown_values(const FrameData* surface, const FrameData* phyxels,
                                  const Colouring& colouring);
 
+/// A field's values at places inside a body: means over the phyxels around each, with the weights
+/// of carriers. @param reach distance at which a phyxel has no weight [m]
+/// @returns shape [places]; none if the frame lacks the field
+std::vector<double> inner_values(const FrameData& phyxels, Index body, const std::string& field,
+                                 const std::vector<Vec3d>& places, double reach);
+
 /// The colour of a value in viridis, by its position in the range.
 Colour field_colour(double value, const Colouring& colouring);
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "annotation.hpp"
 #include "draw_obstacles.hpp"
 #include "label.hpp"
 #include "shadow.hpp"
@@ -31,75 +32,126 @@ std::span<const Index> body_numbers(const FrameData& frame) {
   return frame.body;
 }
 
+/// Points of a frame with their colours.
+struct DrawnPoints {
+  std::vector<Vec3d> point;
+  std::vector<Colour> colour;
+  std::vector<Index> body;  // empty for one body
+
+  /// Leaves out the points that a plane cuts away.
+  void cut(const CutPlane& plane) {
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < point.size(); ++i) {
+      if (plane.height(point[i]) > 0) continue;
+      point[kept] = point[i];
+      colour[kept] = colour[i];
+      if (!body.empty()) body[kept] = body[i];
+      ++kept;
+    }
+    point.resize(kept);
+    colour.resize(kept);
+    body.resize(std::min(kept, body.size()));
+  }
+};
+
 /// The bodies of a frame, ready to be drawn from any side: surfaces, or else phyxels.
 class Bodies {
  public:
   Bodies(const FrameData* surface, const FrameData* phyxels, const Setting& setting)
-      : surface_(surface),
+      : setting_(setting),
         frame_(surface != nullptr ? surface : phyxels),
-        radius_(0.42 * setting.spacing) {
+        phyxels_(phyxels),
+        has_surface_(surface != nullptr) {
     if (frame_ == nullptr) return;
-    colour_ = colours(*frame_, body_colour);
-    if (setting.colouring) colour_by_field(surface, phyxels, *setting.colouring);
-    if (surface != nullptr && surface->normal.size() != surface->point.size()) {
-      made_normal_ = vertex_normals(surface->point, surface->triangle);
+    std::vector<Colour> colour = colours(*frame_, body_colour);
+    if (setting.colouring) colour_by_field(surface, phyxels, *setting.colouring, colour);
+    const std::span<const Index> body = body_numbers(*frame_);
+    if (surface == nullptr) {
+      spheres_ = {frame_->point, std::move(colour), {body.begin(), body.end()}};
+      if (setting.cut) spheres_.cut(*setting.cut);
+      return;
     }
-    if (surface != nullptr && phyxels != nullptr) find_torn(*phyxels, setting.colouring);
+    surface_ = {surface->point,
+                surface->normal,
+                std::move(colour),
+                {body.begin(), body.end()},
+                surface->triangle};
+    if (surface->normal.size() != surface->point.size()) {
+      surface_.normal = vertex_normals(surface->point, surface->triangle);
+    }
+    if (setting.cut) outlines_ = cut_away(surface_, *setting.cut);
+    if (phyxels != nullptr) find_torn(*phyxels);
   }
 
   bool any() const { return frame_ != nullptr; }
-  std::span<const Vec3d> points() const { return frame_->point; }
+  std::span<const Vec3d> points() const { return has_surface_ ? surface_.point : spheres_.point; }
   double time() const { return frame_->time; }  ///< [s]
 
   void draw(Rasteriser& rasteriser) const {
-    if (surface_ != nullptr) {
-      rasteriser.draw_surface(surface_->point,
-                              made_normal_.empty() ? surface_->normal : made_normal_,
-                              surface_->triangle, colour_, body_numbers(*surface_));
-      rasteriser.draw_spheres(torn_, torn_colour_, torn_body_, style_of(rasteriser.camera()));
-    } else {
-      rasteriser.draw_spheres(frame_->point, colour_, body_numbers(*frame_),
-                              style_of(rasteriser.camera()));
+    if (has_surface_) {
+      rasteriser.draw_surface(surface_.point, surface_.normal, surface_.triangle, surface_.colour,
+                              surface_.body);
+    }
+    const Camera& camera = rasteriser.camera();
+    const DotStyle style{.radius = 0.42 * setting_.spacing,
+                         .largest = 0.04 * std::min(camera.width, camera.height)};
+    rasteriser.draw_spheres(spheres_.point, spheres_.colour, spheres_.body, style);
+  }
+
+  /// Draws the faces that a plane cuts into surfaces.
+  void draw_faces(Rasteriser& rasteriser) const {
+    for (const CutOutline& outline : outlines_) {
+      draw_face(rasteriser, outline, *setting_.cut, [&](const std::vector<Vec3d>& places) {
+        return face_colours(places, outline.body);
+      });
     }
   }
 
  private:
-  DotStyle style_of(const Camera& camera) const {
-    return {.radius = radius_, .largest = 0.04 * std::min(camera.width, camera.height)};
-  }
-
   /// Finds the phyxels that have lost pairs, which are seen where a surface has opened.
-  void find_torn(const FrameData& phyxels, const std::optional<Colouring>& colouring) {
+  void find_torn(const FrameData& phyxels) {
     const auto broken = field_values(phyxels, "broken");
     if (!broken) return;
     std::vector<Colour> colour = colours(phyxels, body_colour);
+    const std::optional<Colouring>& colouring = setting_.colouring;
     const auto values = colouring ? field_values(phyxels, colouring->field) : std::nullopt;
     for (std::size_t i = 0; i < phyxels.point.size(); ++i) {
       if (!((*broken)[i] > 0)) continue;
-      torn_.push_back(phyxels.point[i]);
-      torn_colour_.push_back(values ? field_colour((*values)[i], *colouring) : colour[i]);
-      torn_body_.push_back(body_numbers(phyxels).empty() ? 0 : phyxels.body[i]);
+      spheres_.point.push_back(phyxels.point[i]);
+      spheres_.colour.push_back(values ? field_colour((*values)[i], *colouring) : colour[i]);
+      spheres_.body.push_back(body_numbers(phyxels).empty() ? 0 : phyxels.body[i]);
     }
+    if (setting_.cut) spheres_.cut(*setting_.cut);
   }
 
   /// Colours the points by a field. NaN has the colour of the lowest value.
-  void colour_by_field(const FrameData* surface, const FrameData* phyxels,
-                       const Colouring& colouring) {
+  static void colour_by_field(const FrameData* surface, const FrameData* phyxels,
+                              const Colouring& colouring, std::vector<Colour>& colour) {
     const std::vector<double> values = shown_values(surface, phyxels, colouring);
-    if (values.size() != colour_.size()) return;
-    for (std::size_t i = 0; i < values.size(); ++i) {
-      colour_[i] = field_colour(values[i], colouring);
-    }
+    if (values.size() != colour.size()) return;
+    for (std::size_t i = 0; i < values.size(); ++i) colour[i] = field_colour(values[i], colouring);
   }
 
-  const FrameData *surface_, *frame_;
-  double radius_;  // of phyxels without a surface [m]
-  std::vector<Colour> colour_;
-  std::vector<Vec3d> made_normal_;  // unless the frame has some
-  // Phyxels beside cracks of a surface.
-  std::vector<Vec3d> torn_;
-  std::vector<Colour> torn_colour_;
-  std::vector<Index> torn_body_;
+  /// The colours of places inside a body: those of its field there, or one that is paler than its
+  /// surface.
+  std::vector<Colour> face_colours(const std::vector<Vec3d>& places, Index body) const {
+    constexpr Colour white{1, 1, 1};
+    std::vector<Colour> colour(places.size(), 0.6f * body_colour(body) + 0.4f * white);
+    if (!setting_.colouring || phyxels_ == nullptr) return colour;
+    const double reach = carrier_reach(setting_.spacing);
+    const auto values = inner_values(*phyxels_, body, setting_.colouring->field, places, reach);
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      colour[k] = field_colour(values[k], *setting_.colouring);
+    }
+    return colour;
+  }
+
+  const Setting& setting_;
+  const FrameData *frame_, *phyxels_;
+  bool has_surface_;
+  DrawnSurface surface_;
+  DrawnPoints spheres_;  // phyxels without a surface, or beside the cracks of one
+  std::vector<CutOutline> outlines_;
 };
 
 /// Adds the extents of an obstacle across the light, up to a distance from the middle: those of a
@@ -147,27 +199,6 @@ void add_obstacles(Rasteriser& rasteriser, const Bodies& bodies, const Setting& 
                  [&](Vec3d place, Index body) { return shadows.light_at(place, body); });
 }
 
-/// Draws a bar of a round length, as it is seen in the middle of the bodies, over the time label.
-void draw_scale_bar(Image& image, const Setting& setting) {
-  constexpr std::uint8_t ink = 64;
-  const double length = round_length(setting.camera, setting.middle);
-  if (!(length > 0)) return;
-  const double scale = text_scale(image);
-  const int margin = static_cast<int>(9 * scale), thick = std::max(1, static_cast<int>(scale));
-  const int width = static_cast<int>(length * setting.camera.focal /
-                                     setting.camera.project(setting.middle).depth);
-  const int cap = static_cast<int>(2 * scale), bottom = image.height - static_cast<int>(23 * scale);
-  if (bottom - 2 * cap < 0 || margin + width >= image.width) return;  // the picture has no room
-  const auto fill = [&](int x0, int x1, int y0, int y1) {
-    for (int y = y0; y < y1; ++y) std::fill_n(image.pixel(x0, y), 3 * (x1 - x0), ink);
-  };
-  fill(margin, margin + width, bottom - thick, bottom);
-  fill(margin, margin + thick, bottom - cap - thick, bottom);
-  fill(margin + width - thick, margin + width, bottom - cap - thick, bottom);
-  draw_text(image, margin + width + static_cast<int>(4 * scale),
-            bottom - static_cast<int>(6 * scale), scale, short_number(length) + " m");
-}
-
 /// True if dots of phyxels would be so near to each other that they hide the surface.
 bool crowds_dots(const Setting& setting) {
   const double depth = setting.camera.project(setting.middle).depth;
@@ -175,17 +206,6 @@ bool crowds_dots(const Setting& setting) {
 }
 
 }  // namespace
-
-double round_length(const Camera& camera, Vec3d place) {
-  const double depth = camera.project(place).depth;
-  const double longest = 0.2 * camera.width * depth / camera.focal;
-  if (!(depth > 0) || !std::isfinite(longest)) return 0;
-  const double unit = std::pow(10, std::floor(std::log10(longest)));
-  for (const double by : {5.0, 2.0}) {
-    if (by * unit <= longest) return by * unit;
-  }
-  return unit;
-}
 
 double typical_spacing(const std::vector<Vec3d>& point) {
   const std::size_t n = point.size();
@@ -213,6 +233,7 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
   const Bodies bodies(surface, phyxels, setting);
   if (bodies.any()) {
     bodies.draw(rasteriser);
+    bodies.draw_faces(rasteriser);
     if (!setting.obstacles.empty()) add_obstacles(rasteriser, bodies, setting);
     rasteriser.shade_hollows(surface != nullptr ? 0.05 * setting.extent : 1.5 * setting.spacing);
   }
@@ -221,8 +242,10 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
     style.largest = 0.04 * std::min(setting.camera.width, setting.camera.height);
     style.radius = 0.20 * setting.spacing;
     style.fade = std::max(3 * setting.spacing, 0.04 * setting.extent);
-    rasteriser.draw_dots(phyxels->point, colours(*phyxels, dot_colour), body_numbers(*phyxels),
-                         style);
+    const std::span<const Index> body = body_numbers(*phyxels);
+    DrawnPoints dots{phyxels->point, colours(*phyxels, dot_colour), {body.begin(), body.end()}};
+    if (setting.cut) dots.cut(*setting.cut);
+    rasteriser.draw_dots(dots.point, dots.colour, dots.body, style);
   }
   Image image = rasteriser.resolve();
   if (bodies.any() && setting.time_decimals >= 0) {
@@ -231,7 +254,10 @@ Image draw_picture(const FrameData* surface, const FrameData* phyxels, const Set
     draw_text(image, margin, image.height - margin - static_cast<int>(7 * scale), scale,
               fmt::format("t = {:.{}f} s", bodies.time(), setting.time_decimals));
   }
-  if (bodies.any() && setting.scale_bar) draw_scale_bar(image, setting);
+  if (bodies.any() && setting.scale_bar) {
+    draw_scale_bar(image, setting.camera, setting.middle);
+    draw_axes(image, setting.camera);
+  }
   if (bodies.any() && setting.colouring) draw_colour_bar(image, *setting.colouring);
   return image;
 }

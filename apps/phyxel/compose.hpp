@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "colouring.hpp"
+#include "cut.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/recorder.hpp"
 #include "rasteriser.hpp"
@@ -16,25 +17,23 @@ namespace phyxel::app {
 struct Setting {
   Camera camera;
   Vec3d up{0, 0, 1};
-  double spacing = 0;      ///< Typical distance between phyxels [m].
-  double extent = 0;       ///< Extent of the visible points [m].
-  int time_decimals = 2;   ///< Decimals of the time label; negative for no label.
-  Vec3d middle;            ///< Of the visible points [m].
-  bool scale_bar = false;  ///< True for a bar of a round length at `middle`.
+  double spacing = 0;     ///< Typical distance between phyxels [m].
+  double extent = 0;      ///< Extent of the visible points [m].
+  int time_decimals = 2;  ///< Decimals of the time label; negative for no label.
+  Vec3d middle;           ///< Of the visible points [m].
+  /// True for a bar of a round length at `middle`, and for the axes of coordinates.
+  bool scale_bar = false;
   double nearest_dots =
       0;  ///< Distance of phyxels below which no dots are drawn on a surface [px].
   std::vector<Obstacle> obstacles = {};     ///< Drawn where they are at the time of a frame.
   RigidPaths paths = {};                    ///< Of those that are free bodies.
   std::optional<Colouring> colouring = {};  ///< Unset: bodies have colours of their own.
+  std::optional<CutPlane> cut = {};         ///< Unset: bodies are drawn whole.
 };
 
 /// Median distance to the nearest point [m], of a few points distributed over the list; 0 for fewer
 /// than two points.
 double typical_spacing(const std::vector<Vec3d>& point);
-
-/// The longest round length, 1, 2 or 5 times a power of ten, that takes at most a fifth of a
-/// picture's width at a place [m]; 0 if the place is behind the camera.
-double round_length(const Camera& camera, Vec3d place);
 
 /// Draws a frame, without dots of phyxels if these are too near to each other or colours show a
 /// field. Phyxels that have lost pairs, by the field `broken` of their frame, are balls that fill

@@ -17,7 +17,7 @@ Colouring field_colours(const std::vector<Shot>& shots, const std::vector<std::s
              phyxels = read_if_any(shots.front().phyxels, true);
   if (surface && phyxels && !surface->point.empty() && !phyxels->point.empty()) {
     colouring.carriers =
-        carriers_of(surface->point, phyxels->point, spacing > 0 ? 1.6 * spacing : 1);
+        carriers_of(surface->point, phyxels->point, carrier_reach(spacing));
   }
   const auto shown = [&](const std::optional<FrameData>& a, const std::optional<FrameData>& b) {
     return shown_values(a ? &*a : nullptr, b ? &*b : nullptr, colouring);
@@ -34,6 +34,13 @@ Colouring field_colours(const std::vector<Shot>& shots, const std::vector<std::s
         "output.fields of the scene adds others",
         request.field, names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "))));
   }
+  const bool cuts = surface && !request.cut.empty();
+  if (cuts && !(phyxels && field_values(*phyxels, request.field))) {
+    throw InputError(fmt::format(
+        "--cut {} --colour {}: the phyxels of the frames lack the field, which the faces of a cut "
+        "take from them; allowed: --cut without --colour, or a field of output.fields",
+        request.cut, request.field));
+  }
   if (request.range) {
     const auto [low, high] = *request.range;
     colouring.range = {low, high, request.scale == Scale::logarithmic};
@@ -42,8 +49,12 @@ Colouring field_colours(const std::vector<Shot>& shots, const std::vector<std::s
   constexpr std::size_t most = 1'000'000;  // values of a sample
   std::vector<double> sample;
   for (const std::size_t k : chosen) {
-    const std::vector<double> values =
-        shown(read_if_any(shots[k].surface, true), read_if_any(shots[k].phyxels, true));
+    const auto inside = read_if_any(shots[k].phyxels, true);
+    std::vector<double> values = shown(read_if_any(shots[k].surface, true), inside);
+    if (cuts && inside) {
+      const auto more = field_values(*inside, request.field);
+      if (more) values.insert(values.end(), more->begin(), more->end());
+    }
     const std::size_t every = 1 + values.size() * chosen.size() / most;
     for (std::size_t i = 0; i < values.size(); i += every) {
       if (std::isfinite(values[i])) sample.push_back(values[i]);

@@ -18,91 +18,75 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Fits the camera to all frames, so that it sees the whole motion.
-Setting set_stage(const std::vector<Shot>& shots, const PictureRequest& request) {
-  Setting setting;
-  setting.time_decimals = time_decimals(shots);
+/// The wishes for the pictures of a trajectory, with the options of the request in their place.
+CameraWishes wishes_for(const std::vector<Shot>& shots, const PictureRequest& request) {
   const Shot& first = shots.front();
   const fs::path& start = first.surface.empty() ? first.phyxels : first.surface;
-  const std::string scene = scene_text(start);
-  const RenderRequest asked = render_request_of(scene, start);
-  setting.obstacles = obstacles_of_frames(scene, request.scene_folder);
-  setting.paths = RigidPaths(start.parent_path());
-  setting.up = request.up.value_or(asked.up);
-  // The scene's `up` and a requested `view` may be parallel, which CameraFit handles.
-  CameraFit fit(request.width, request.height, request.view.value_or(asked.view), setting.up);
-  Span height;  // along `up`
-  for (const Shot& shot : shots) {
-    for (const fs::path& file : {shot.surface, shot.phyxels}) {
-      const auto frame = read_if_any(file);
-      if (!frame) continue;
-      fit.include(frame->point);
-      for (const Vec3d& p : frame->point) height.include(dot(p, normalised(setting.up)));
-    }
-  }
-  for (const Obstacle& obstacle : setting.obstacles) {
-    for (const auto& [time, state] : setting.paths.of(obstacle))
-      fit.include(std::span(&state.place, 1));
-  }
-  if (fit.empty()) throw InputError("the frames have no point with finite coordinates");
-  const auto phyxels = read_if_any(shots.front().phyxels);
-  if (phyxels) setting.spacing = typical_spacing(phyxels->point);
-  setting.camera = fit.camera();
-  setting.extent = fit.extent();
-  setting.middle = fit.middle();
-  setting.scale_bar = true;
-  setting.nearest_dots = 8;
-  if (request.floor && setting.obstacles.empty() &&
-      looks_down(setting.camera.forward, setting.up)) {
-    setting.obstacles.push_back(
-        floor_below(setting.up, setting.middle, height.low, setting.extent));
-  }
-  for (Obstacle& obstacle : setting.obstacles) {
-    const double spacing = std::max(0.5 * setting.spacing, setting.extent / 256);
-    obstacle.set_field(spacing, 4 * spacing);
-  }
-  return setting;
+  return with_options(camera_wishes(scene_text(start), start), request.camera);
 }
 
-/// Some points of each frame, the outermost ones among them.
-std::vector<Vec3d> some_points(const std::vector<Shot>& shots) {
-  constexpr std::size_t most = 500;  // of a frame, beside the outermost ones
-  std::vector<Vec3d> points;
-  Outermost outermost;
-  for (const Shot& shot : shots) {
-    for (const fs::path& file : {shot.surface, shot.phyxels}) {
-      const auto frame = read_if_any(file);
-      if (!frame) continue;
-      const std::size_t every = 1 + frame->point.size() / most;
-      for (std::size_t k = 0; k < frame->point.size(); ++k) {
-        outermost.include(frame->point[k]);
-        if (k % every == 0) points.push_back(frame->point[k]);
-      }
+/// Some points of a frame, and the outermost ones of all.
+class SomePoints {
+ public:
+  void add(const std::vector<Vec3d>& points, Vec3d way) {
+    constexpr std::size_t most = 500;  // of a frame, beside the outermost ones
+    const std::size_t every = 1 + points.size() / most;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      outermost_.include(points[k] - way);
+      if (k % every == 0) points_.push_back(points[k] - way);
     }
   }
-  points.insert(points.end(), outermost.points().begin(), outermost.points().end());
-  return points;
-}
+  /// All points that were kept.
+  std::vector<Vec3d> points() const {
+    std::vector<Vec3d> all = points_;
+    all.insert(all.end(), outermost_.points().begin(), outermost_.points().end());
+    return all;
+  }
+
+ private:
+  std::vector<Vec3d> points_;
+  Outermost outermost_;
+};
 
 /// The setting of some pictures, with a camera of each.
 class Stage {
  public:
   /// @param chosen number of the shot of each picture
   Stage(const std::vector<Shot>& shots, const std::vector<std::size_t>& chosen,
-        const PictureRequest& request)
-      : shots_(shots), setting_(set_stage(shots, request)) {
+        const PictureRequest& request, const CameraWishes& wishes)
+      : shots_(shots),
+        chosen_(chosen),
+        fit_(request.width, request.height, wishes.view, wishes.up, wishes.camera.field_of_view) {
+    const fs::path& start =
+        shots.front().surface.empty() ? shots.front().phyxels : shots.front().surface;
+    const std::string scene = scene_text(start);
+    followed_.emplace(wishes.camera.follow, scene, request.scene_folder / "scene.toml");
+    setting_.time_decimals = time_decimals(shots);
+    setting_.up = wishes.up;
+    setting_.obstacles = obstacles_of_frames(scene, request.scene_folder);
+    setting_.paths = RigidPaths(start.parent_path());
+    read_frames();
+    place_cameras(wishes);
+    if (request.floor) add_floor();
+    for (Obstacle& obstacle : setting_.obstacles) {
+      const double spacing = std::max(0.5 * setting_.spacing, setting_.extent / 256);
+      obstacle.set_field(spacing, 4 * spacing);
+    }
+    if (!request.cut.empty()) cut_ = cut_plane(request.cut, cameras_.front().eye);
     if (!request.colour.empty()) {
       setting_.colouring = field_colours(
-          shots, chosen, {request.colour, request.range, request.scale}, setting_.spacing);
+          shots, chosen, {request.colour, request.range, request.scale, request.cut}, setting_.spacing);
     }
-    if (request.orbit == 0) return;
-    cameras_ = orbit(setting_.camera, setting_.up, setting_.middle, some_points(shots),
-                     request.orbit, chosen.size());
   }
 
-  /// Draws a shot. @param picture number of the picture among those chosen
-  Image draw(std::size_t shot, std::size_t picture) {
-    if (!cameras_.empty()) setting_.camera = cameras_[picture];
+  /// Draws a picture. @param picture its number among those chosen
+  Image draw(std::size_t picture) {
+    const std::size_t shot = chosen_[picture];
+    const Vec3d way = followed_->way(shot);
+    setting_.camera = cameras_[picture];
+    setting_.camera.eye += way;
+    setting_.middle = fit_.middle() + way;
+    if (cut_) setting_.cut = CutPlane{cut_->point + way, cut_->normal};
     const bool fields = setting_.colouring.has_value();
     const auto surface = read_if_any(shots_[shot].surface, fields);
     const auto phyxels = read_if_any(shots_[shot].phyxels, fields || surface);
@@ -110,9 +94,51 @@ class Stage {
   }
 
  private:
+  /// Reads all frames, so that the camera sees the whole motion.
+  void read_frames() {
+    for (std::size_t k = 0; k < shots_.size(); ++k) {
+      const auto surface = read_if_any(shots_[k].surface), phyxels = read_if_any(shots_[k].phyxels);
+      followed_->add(surface ? &*surface : nullptr, phyxels ? &*phyxels : nullptr);
+      if (k == 0 && phyxels) setting_.spacing = typical_spacing(phyxels->point);
+      for (const auto* frame : {&surface, &phyxels}) {
+        if (!*frame) continue;
+        fit_.include((*frame)->point, followed_->way(k));
+        some_.add((*frame)->point, followed_->way(k));
+        for (const Vec3d& p : (*frame)->point) height_.include(dot(p, normalised(setting_.up)));
+      }
+    }
+    for (const Obstacle& obstacle : setting_.obstacles) {
+      for (const auto& [time, state] : setting_.paths.of(obstacle)) {
+        fit_.include(std::span(&state.place, 1));
+      }
+    }
+    if (fit_.empty()) throw InputError("the frames have no point with finite coordinates");
+  }
+
+  void place_cameras(const CameraWishes& wishes) {
+    cameras_ = camera_path(wishes, fit_, some_.points(), chosen_.size());
+    setting_.camera = cameras_.front();
+    setting_.extent = fit_.extent();
+    setting_.middle = fit_.middle();
+    setting_.scale_bar = true;
+    setting_.nearest_dots = 8;
+  }
+
+  void add_floor() {
+    if (!setting_.obstacles.empty() || !looks_down(setting_.camera.forward, setting_.up)) return;
+    setting_.obstacles.push_back(
+        floor_below(setting_.up, setting_.middle, height_.low, setting_.extent));
+  }
+
   const std::vector<Shot>& shots_;
+  const std::vector<std::size_t>& chosen_;
+  CameraFit fit_;
+  std::optional<FollowedBody> followed_;
+  SomePoints some_;
+  Span height_;  // of all points along `up`
   Setting setting_;
-  std::vector<Camera> cameras_;  // of the pictures; empty if they share that of the setting
+  std::vector<Camera> cameras_;  // of the pictures, as if the followed body did not move
+  std::optional<CutPlane> cut_;  // likewise
 };
 
 bool is_picture_name(const std::string& name) {
@@ -133,9 +159,9 @@ std::vector<fs::path> render(const fs::path& input, const fs::path& folder,
                                                 : input.stem().string() + ".png"));
     check_output_file(files.back(), overwrite, Output::file);
   }
-  Stage stage(trajectory.shots, chosen, request);
+  Stage stage(trajectory.shots, chosen, request, wishes_for(trajectory.shots, request));
   make_writable_folder(folder);
-  for (std::size_t k = 0; k < chosen.size(); ++k) write_png(files[k], stage.draw(chosen[k], k));
+  for (std::size_t k = 0; k < chosen.size(); ++k) write_png(files[k], stage.draw(k));
   return files;
 }
 
@@ -144,14 +170,15 @@ std::size_t render_video(const fs::path& input, const VideoRequest& video,
   check_video(video, request.width, request.height, overwrite);
   const Trajectory trajectory = find_trajectory(input, {request.surface, request.phyxels});
   auto chosen = choose_frames(request.choice, trajectory.shots.size());
-  if (chosen.size() == 1 && request.orbit != 0) {
+  const CameraWishes wishes = wishes_for(trajectory.shots, request);
+  if (chosen.size() == 1 && wishes.camera.orbit != 0) {
     constexpr int seconds = 4;
     chosen.resize(static_cast<std::size_t>(seconds * video.pictures_per_second), chosen[0]);
   }
-  Stage stage(trajectory.shots, chosen, request);
+  Stage stage(trajectory.shots, chosen, request, wishes);
   if (video.file.has_parent_path()) make_writable_folder(video.file.parent_path());
   Video film(video, request.width, request.height);
-  for (std::size_t k = 0; k < chosen.size(); ++k) film.add(stage.draw(chosen[k], k));
+  for (std::size_t k = 0; k < chosen.size(); ++k) film.add(stage.draw(k));
   film.finish();
   return chosen.size();
 }
@@ -162,8 +189,6 @@ std::vector<fs::path> render_directory(const fs::path& out, const Scene& scene, 
   pictures.scene_folder = scene.file.parent_path();
   pictures.width = request.width;
   pictures.height = request.height;
-  pictures.view = request.view;
-  pictures.up = request.up;
   pictures.choice.count = request.count;
   const fs::path folder = out / "pictures";
   if (overwrite && fs::is_directory(folder)) {

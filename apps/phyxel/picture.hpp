@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "camera_path.hpp"
 #include "compose.hpp"
 #include "phyxel/scene.hpp"
 #include "trajectory.hpp"
@@ -15,9 +16,8 @@
 namespace phyxel::app {
 
 struct PictureRequest {
-  int width = 960, height = 720;  ///< [px]
-  /// Directions of the camera and of the picture's vertical; if unset, those of the frames' scene.
-  std::optional<Vec3d> view, up;
+  int width = 960, height = 720;        ///< [px]
+  CameraOptions camera;                 ///< In place of the camera of the scene.
   bool phyxels = true, surface = true;  ///< Families that are drawn, if they exist.
   /// True for a floor below the bodies, if the scene has no obstacles and the camera looks down.
   bool floor = true;
@@ -27,14 +27,14 @@ struct PictureRequest {
   std::optional<std::pair<double, double>> range = {};
   Scale scale =
       Scale::automatic;  ///< Of the colours; linear if it is automatic and `range` is set.
-  double orbit = 0;  ///< Angle by which the camera turns about `up` from first to last picture [°].
+  std::string cut = {};  ///< Plane that cuts bodies (`cut_plane`); "": they are drawn whole.
   /// Folder of the scene, from which it names meshes; empty: the current one.
   std::filesystem::path scene_folder = {};
 };
 
 /// Draws the frames of a run's folder (phyxels and surface), a series file or a frame file, with
-/// one camera that sees the whole motion. Pictures of a series are `folder`/frame_<number>.png; the
-/// picture of a single frame has its name.
+/// the camera that is wished, by default one that sees the whole motion. Pictures of a series are
+/// `folder`/frame_<number>.png; the picture of a single frame has its name.
 /// @returns the files written, in order of time
 /// @throws InputError if there is nothing to draw, or, without `overwrite`, if one of the pictures
 ///   exists (none is written then); OutputError if writing fails

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
@@ -18,7 +17,7 @@ struct RenderOptions {
   std::filesystem::path input, out;
   VideoRequest video;
   PictureRequest request;
-  std::vector<double> view, up;
+  std::vector<double> view, up, position, target;
   ColourOptions colours;
   bool no_phyxels = false, no_surface = false, no_floor = false, force = false, json = false;
 };
@@ -46,15 +45,14 @@ void video_command(const RenderOptions& options, const PictureRequest& request) 
 
 void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
-  request.view = vector_of(options.view, "--view");
-  request.up = vector_of(options.up, "--up");
+  request.camera.view = vector_of(options.view, "--view");
+  request.camera.up = vector_of(options.up, "--up");
+  request.camera.position = vector_of(options.position, "--position");
+  request.camera.target = vector_of(options.target, "--target");
   const ColourRequest colours = options.colours.request();
   request.colour = colours.field;
   request.range = colours.range;
   request.scale = colours.scale;
-  if (!std::isfinite(request.orbit)) {
-    throw InputError(fmt::format("--orbit {}: allowed: a finite angle in degrees", request.orbit));
-  }
   request.phyxels = !options.no_phyxels;
   request.surface = !options.no_surface;
   request.floor = !options.no_floor;
@@ -92,11 +90,36 @@ void add_video_options(CLI::App& command, RenderOptions& options, CLI::Option* o
       ->check(CLI::Range(1, 240))
       ->capture_default_str()
       ->needs(video);
+}
+
+/// Adds the options that replace the camera of the scene.
+void add_camera_options(CLI::App& command, RenderOptions& options) {
+  const auto vector = [&](const char* name, std::vector<double>& value, const char* meaning) {
+    command.add_option(name, value, meaning)->delimiter(',')->allow_extra_args(false);
+  };
+  CameraOptions& camera = options.request.camera;
+  vector("--view", options.view,
+         "Direction of the camera: x,y,z (default: the scene's). It sees the whole motion, unless "
+         "--position or --target is given");
+  vector("--up", options.up, "Vertical direction of the picture: x,y,z (default: the scene's)");
+  vector("--position", options.position, "Place of the camera [m]: x,y,z (default: the scene's)");
+  vector("--target", options.target,
+         "Point in the middle of the picture [m]: x,y,z (default: the scene's)");
   command
-      .add_option("--orbit", options.request.orbit,
-                  "Angle by which the camera turns about the vertical, from the first picture to "
-                  "the last [degrees]; a video of one frame then takes four seconds")
+      .add_option("--field-of-view", camera.field_of_view,
+                  "Angle of view along the shorter side of the picture [degrees] (default: the "
+                  "scene's, else 30)")
+      ->check(CLI::Range(1.0, 150.0));
+  command
+      .add_option(
+          "--orbit", camera.orbit,
+          "Angle by which the camera turns about the vertical, around the target, from the "
+          "first picture to the last [degrees] (default: the scene's); a video of one frame "
+          "then takes four seconds")
       ->check(CLI::Range(-36000.0, 36000.0));
+  command.add_option(
+      "--follow", camera.follow,
+      "Name of a body that the camera moves with (default: the scene's; '' for none)");
 }
 
 }  // namespace
@@ -115,15 +138,7 @@ void add_render(CLI::App& program) {
   add_frame_options(*command, request.choice);
   command->add_option("--width", request.width, "Width [px]")->capture_default_str();
   command->add_option("--height", request.height, "Height [px]")->capture_default_str();
-  command
-      ->add_option("--view", options->view, "Direction of the camera: x,y,z (default: the scene's)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
-  command
-      ->add_option("--up", options->up,
-                   "Vertical direction of the picture: x,y,z (default: the scene's)")
-      ->delimiter(',')
-      ->allow_extra_args(false);
+  add_camera_options(*command, *options);
   add_colour_options(*command, options->colours);
   add_video_options(*command, *options, out);
   command->add_option("--scene-folder", request.scene_folder,
@@ -134,6 +149,11 @@ void add_render(CLI::App& program) {
       "Draw the surface only, without dots of phyxels, which are drawn where they are 8 px "
       "apart at least");
   command->add_flag("--no-surface", options->no_surface, "Draw the phyxels only, as spheres");
+  command->add_option(
+      "--cut", request.cut,
+      "Plane that opens the bodies: x, y or z=position [m], which cuts away the side of the camera "
+      "of the first picture, or a point and a normal, x,y,z,nx,ny,nz, which cuts away the side of "
+      "the normal; with --follow the plane moves with the body");
   command->add_flag(
       "--no-floor", options->no_floor,
       "Draw no floor, as is drawn below the bodies of a scene without obstacles if the "
@@ -146,6 +166,9 @@ void add_render(CLI::App& program) {
       "  phyxel render out/dino --frames 0,10,-1 --view 0,1,0 --out pictures\n"
       "  phyxel render out/dino --colour speed --range 0,2\n"
       "  phyxel render out/dino --count 6 --colour von_mises --scale log\n"
+      "  phyxel render out/dino --colour von_mises --cut y=0.1\n"
+      "  phyxel render out/dino --position 0,-3,1 --target 0,0,0.5 --field-of-view 40\n"
+      "  phyxel render out/dino --video dino.mp4 --view 0,1,0 --follow dino\n"
       "  phyxel render out/dino --video dino.mp4 --orbit 90\n"
       "  phyxel render out/dino/surface_000010.hdf");
   command->callback([options] { render_command(*options); });

@@ -9,6 +9,7 @@
 #include <map>
 
 #include "files/atomic_file.hpp"
+#include "phyxel/camera_request.hpp"
 #include "phyxel/error.hpp"
 #include "scene/parse_obstacles.hpp"
 #include "scene/scene_body.hpp"
@@ -91,6 +92,28 @@ RenderRequest default_render(Vec3d gravity) {
   return render;
 }
 
+/// Reads the camera in a scene's table of pictures.
+CameraRequest read_camera(const SceneTable& render) {
+  CameraRequest camera;
+  if (!render.has("camera")) return camera;
+  const SceneTable table = render.table("camera");
+  table.read("position", camera.position);
+  table.read("target", camera.target);
+  table.read("field_of_view", camera.field_of_view);
+  table.read("orbit", camera.orbit);
+  table.read("follow", camera.follow);
+  if (!camera.position || !camera.target) return camera;
+  if (render.has("view")) {
+    render.refuse("view",
+                  "found beside camera.position and camera.target, which are a direction of view; "
+                  "allowed: with one of them at most");
+  }
+  if (!(norm(*camera.target - *camera.position) > 0)) {
+    table.refuse("target", "the place of the camera found; allowed: another point");
+  }
+  return camera;
+}
+
 RenderRequest read_render(const SceneTable& table, Vec3d gravity) {
   RenderRequest render = default_render(gravity);
   table.read("pictures", render.pictures);
@@ -103,6 +126,8 @@ RenderRequest read_render(const SceneTable& table, Vec3d gravity) {
   if (table.has("up") && !table.has("view") && !(norm(scaled(render.up)) < 0.5)) {
     render.view = turned(RenderRequest{}.view, scaled(render.up));
   }
+  const CameraRequest camera = read_camera(table);
+  if (camera.position && camera.target) render.view = *camera.target - *camera.position;
   if (!table.has("up") && are_parallel(scaled(render.view), render.up)) {
     render.up = RenderRequest{}.up;
   }
@@ -110,7 +135,9 @@ RenderRequest read_render(const SceneTable& table, Vec3d gravity) {
   if (norm(view) < 0.5) table.refuse("view", words(render.view) + " found; allowed: not zero");
   if (norm(up) < 0.5) table.refuse("up", words(render.up) + " found; allowed: not zero");
   if (are_parallel(view, up)) {
-    table.refuse(table.has("view") ? "view" : "up",
+    table.refuse(table.has("view") ? "view"
+                 : table.has("up") ? "up"
+                                   : "camera",
                  fmt::format("view {} and up {} found, which are parallel; allowed: any two other "
                              "directions",
                              words(render.view), words(render.up)));
@@ -120,6 +147,18 @@ RenderRequest read_render(const SceneTable& table, Vec3d gravity) {
 
 RenderRequest render_of(const SceneTable& root, Vec3d gravity) {
   return root.has("render") ? read_render(root.table("render"), gravity) : default_render(gravity);
+}
+
+/// Refuses a camera that follows a body that the scene lacks.
+void check_followed(const SceneTable& root, const std::vector<BodyRequest>& bodies) {
+  if (!root.has("render")) return;
+  const SceneTable render = root.table("render");
+  const std::string followed = read_camera(render).follow;
+  const auto is_it = [&](const BodyRequest& body) { return body.name == followed; };
+  if (followed.empty() || std::any_of(bodies.begin(), bodies.end(), is_it)) return;
+  render.table("camera").refuse(
+      "follow", fmt::format("{} found, which no body is called; allowed: {}", in_quotes(followed),
+                            names_of(bodies)));
 }
 
 std::vector<BodyRequest> read_bodies(const SceneTable& root) {
@@ -185,6 +224,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   if (root.has("contact")) scene.contact = read_contact(root.table("contact"), scene.bodies);
   check_penalties(scene);
   naming(scene, [&] { read_probes(root, scene.bodies); });
+  check_followed(root, scene.bodies);
   return scene;
 }
 
@@ -194,6 +234,12 @@ RenderRequest parse_render(const std::string& text, const std::filesystem::path&
   Vec3d gravity;
   root.read("gravity", gravity);
   return render_of(root, gravity);
+}
+
+CameraRequest parse_camera(const std::string& text, const std::filesystem::path& file) {
+  const toml::table parsed = parse_toml(text, file);
+  const SceneTable root(parsed, file);
+  return root.has("render") ? read_camera(root.table("render")) : CameraRequest{};
 }
 
 Scene parse_obstacles(const std::string& text, const std::filesystem::path& file) {

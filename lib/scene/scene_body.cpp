@@ -349,4 +349,12 @@ std::vector<BodyRequest> body_requests(const SceneTable& table) {
   return copies(body, table.table("array"));
 }
 
+std::string names_of(const std::vector<BodyRequest>& bodies) {
+  std::string names;
+  for (std::size_t b = 0; b < std::min<std::size_t>(bodies.size(), 8); ++b) {
+    names += (b > 0 ? ", " : "") + in_quotes(bodies[b].name);
+  }
+  return bodies.size() > 8 ? names + ", ..." : names;
+}
+
 }  // namespace phyxel

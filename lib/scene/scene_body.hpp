@@ -1,6 +1,7 @@
 /// From a [[body]] of a scene file to body requests.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "phyxel/scene.hpp"
@@ -19,5 +20,8 @@ void read_path(const SceneTable& table, MotionRequest& motion);
 
 /// One request, or one for each copy of an array.
 std::vector<BodyRequest> body_requests(const SceneTable& body);
+
+/// The names of the bodies in quotes, for messages; of more than eight, the first ones.
+std::string names_of(const std::vector<BodyRequest>& bodies);
 
 }  // namespace phyxel

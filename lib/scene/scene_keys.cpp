@@ -158,7 +158,7 @@ std::vector<SceneKey> run_keys() {
        .meaning = "Wall-clock time between checkpoints; 0: only one, at the end."},
 
       {.section = "render", .name = "pictures", .type = KeyType::boolean, .fallback = "false",
-       .meaning = "Write pictures (PNG). `view` and `up` also serve `phyxel render` and `phyxel report`."},
+       .meaning = "Write pictures (PNG). `view`, `up` and `camera` also serve `phyxel render` and `phyxel report`."},
       {.section = "render", .name = "count", .type = KeyType::integer, .fallback = "6",
        .range = between(1, 100000),
        .meaning = "How many, spread evenly over the frames, first and last included."},
@@ -170,6 +170,19 @@ std::vector<SceneKey> run_keys() {
        .range = within(longest), .meaning = "Direction the camera looks along."},
       {.section = "render", .name = "up", .type = KeyType::vector, .otherwise = "against `gravity`; [0, 0, 1] if there is none",
        .range = within(longest), .meaning = "Direction that points up in the picture; not parallel to `view`."},
+      {.section = "render", .name = "camera", .type = KeyType::table, .otherwise = "it sees the whole motion along `view`",
+       .meaning = "Place and movement of the camera."},
+
+      {.section = "render.camera", .name = "position", .type = KeyType::vector, .unit = "m", .otherwise = "where it sees all bodies",
+       .range = within(longest), .meaning = "Place of the camera. With a `target` it looks towards that, without one along `view`."},
+      {.section = "render.camera", .name = "target", .type = KeyType::vector, .unit = "m", .otherwise = "the middle of the motion",
+       .range = within(longest), .meaning = "Point in the middle of the picture, about which an orbit goes. Without a `position` the camera looks along `view` from where it sees all bodies."},
+      {.section = "render.camera", .name = "field_of_view", .unit = "degrees", .fallback = "30",
+       .range = between(1, 150), .meaning = "Angle of view along the shorter side of the picture."},
+      {.section = "render.camera", .name = "orbit", .unit = "degrees", .fallback = "0",
+       .range = between(-36000, 36000), .meaning = "Angle by which the camera turns about `up` around its target, from the first picture to the last. A report opens without a turn."},
+      {.section = "render.camera", .name = "follow", .type = KeyType::text, .otherwise = "none",
+       .meaning = "Name of a body: camera and target move with the centre of its points, from where they are at the first frame."},
   };
 }
 

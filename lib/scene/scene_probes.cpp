@@ -63,13 +63,8 @@ BodyRequest& body_of(const SceneTable& table, std::vector<BodyRequest>& bodies) 
   const auto found = std::find_if(bodies.begin(), bodies.end(),
                                   [&](const BodyRequest& body) { return body.name == name; });
   if (found != bodies.end()) return *found;
-  std::string names;
-  for (std::size_t b = 0; b < std::min<std::size_t>(bodies.size(), 8); ++b) {
-    names += (b > 0 ? ", " : "") + in_quotes(bodies[b].name);
-  }
-  if (bodies.size() > 8) names += ", ...";
   table.refuse("body", fmt::format("{} found, which no body is called; allowed: {}",
-                                   in_quotes(name), names));
+                                   in_quotes(name), names_of(bodies)));
 }
 
 }  // namespace

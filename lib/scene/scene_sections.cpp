@@ -120,6 +120,7 @@ std::vector<SceneSection> make_sections() {
       {"solver", "[solver]", "", "What computes, and in which precision."},
       {"output", "[output]", "", "What is written, where and how often."},
       {"render", "[render]", "", "Pictures made at the end of a run."},
+      {"render.camera", "[render.camera]", "", "Camera of pictures, of `phyxel render`, whose options override it, and of the opening view of `phyxel report`. Without it the camera sees the whole motion."},
       {"body", "[[body]]", "",
        "One such section for each body. Exactly one of `shape`, `mesh`, `file` and `cloud` says "
        "where its rest shape comes from:\n\n"

@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "png_reader.hpp"
 #include "support/thrown_block.hpp"
 
 namespace phyxel::app {
@@ -161,6 +162,34 @@ TEST_F(ColouredPictures, SurfacesHaveTheFieldsOfTheirScene) {
     EXPECT_NEAR(velocity[k], k % 3 == 2 ? 2 : 0, 1e-6);
   }
   EXPECT_EQ(surface.field.at("displacement").size(), velocity.size());
+}
+
+TEST_F(ColouredPictures, ShowTheInsideByACut) {
+  const auto green_of = [&](const std::vector<std::string>& more, const char* out) {
+    std::vector<std::string> words{"render", "out",      "--frames", "0",          "--width",
+                                   "200",    "--height", "200",      "--no-floor", "--view",
+                                   "0,1,0",  "--out",    out};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome done = run(words);
+    EXPECT_EQ(done.code, 0) << done.err;
+    return read_png(folder_ / out / "frame_000000.png").rgb;
+  };
+  const std::vector<std::string> coloured{"--colour", "speed", "--range", "1,2"};
+  auto cut = coloured;
+  cut.insert(cut.end(), {"--cut", "y=0.1"});
+  EXPECT_NE(green_of(coloured, "whole"), green_of(cut, "cut"));
+  EXPECT_NE(green_of({}, "plain"), green_of({"--cut", "0,0,0,0,-1,0"}, "plain_cut"));
+  const auto refused = [&](const std::vector<std::string>& more, const char* why) {
+    std::vector<std::string> words{"render", "out", "--out", "none"};
+    words.insert(words.end(), more.begin(), more.end());
+    const Outcome outcome = run(words);
+    EXPECT_EQ(outcome.code, 2);
+    EXPECT_THAT(outcome.err, HasSubstr(why));
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "none"));
+  };
+  refused({"--cut", "q=1"}, "--cut q=1: allowed: a position [m] along an axis");
+  refused({"--no-phyxels", "--colour", "speed", "--cut", "x=0"},
+          "--cut x=0 --colour speed: the phyxels of the frames lack the field");
 }
 
 TEST_F(ColouredPictures, HaveAFloorWithShadowsIfTheCameraLooksDown) {

@@ -1,7 +1,6 @@
 /// Pictures of a trajectory: content, choice of frames, and files.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <png.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,9 +9,11 @@
 #include <limits>
 #include <random>
 
+#include "annotation.hpp"
 #include "ball.hpp"
 #include "picture.hpp"
 #include "png_file.hpp"
+#include "png_reader.hpp"
 #include "report/report.hpp"
 #include "support/folder.hpp"
 
@@ -168,16 +169,6 @@ TEST(Picture, BodiesHaveTheirOwnColours) {
 
 class Files : public test::Folder {
  protected:
-  static Image read_png(const fs::path& file) {
-    png_image png = {};
-    png.version = PNG_IMAGE_VERSION;
-    EXPECT_NE(png_image_begin_read_from_file(&png, file.c_str()), 0) << file << png.message;
-    EXPECT_EQ(png.format, static_cast<png_uint_32>(PNG_FORMAT_RGB));
-    Image image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
-    image.rgb.resize(PNG_IMAGE_SIZE(png));
-    EXPECT_NE(png_image_finish_read(&png, nullptr, image.rgb.data(), 0, nullptr), 0) << png.message;
-    return image;
-  }
   std::vector<std::string> names_in(const fs::path& folder) const {
     std::vector<std::string> names;
     for (const auto& entry : fs::directory_iterator(folder)) {
@@ -354,8 +345,8 @@ material = { young = 1e5, poisson = 0.3, density = 1000 }
   EXPECT_LT(drop("gravity = [0, 0, 9.81]"), -20);
   EXPECT_LT(drop("gravity = [0, 0, -9.81]\n[render]\nup = [0, 0, -1]"), -20);
   EXPECT_NEAR(drop("[render]\nup = [0, 1, 0]\nview = [-1, 0, 0]"), 0, 3);  // sideways
-  request_.up = Vec3d{0, 0, 1};
-  request_.view = Vec3d{0, 1, 0};
+  request_.camera.up = Vec3d{0, 0, 1};
+  request_.camera.view = Vec3d{0, 1, 0};
   EXPECT_GT(drop("gravity = [0, 0, 9.81]"), 20);
 }
 

@@ -31,8 +31,14 @@ pictures = true # render.pictures => pictures = false
 count = 2 # render.count => count = 3
 width = 100 # render.width => width = 200
 height = 100 # render.height => height = 200
-view = [1, 0, 0] # render.view => view = [0, 1, 0]
+# render.view => view = [0, 1, 0]
 up = [0, 0, 1] # render.up => up = [0, 0.1, 1]
+[render.camera]
+position = [-5, 0, 0] # render.camera.position => position = [-6, 0, 0]
+# render.camera.target => target = [0, 0, 1]
+field_of_view = 30 # render.camera.field_of_view => field_of_view = 40
+orbit = 90 # render.camera.orbit => orbit = 180
+follow = 'third' # render.camera.follow => follow = 'fourth'
 [[body]]
 name = 'first' # body.name => name = 'other'
 shape = 'block' # body.shape => shape = 'beam'

@@ -7,6 +7,10 @@
 
 namespace phyxel::app {
 
+double carrier_reach(double spacing) { return spacing > 0 ? 1.6 * spacing : 1; }
+
+double carrier_weight(double q) { return std::pow(std::max(1e-3, 1 - q * q), 3); }
+
 Carriers carriers_of(const std::vector<Vec3d>& surfels, const std::vector<Vec3d>& phyxels,
                      double reach) {
   Carriers made;
@@ -23,14 +27,13 @@ Carriers carriers_of(const std::vector<Vec3d>& surfels, const std::vector<Vec3d>
     std::sort(near.begin(), near.end());
     near.resize(std::min(near.size(), Carriers::each));
     double sum = 0;
-    const auto weight = [](double q) { return std::pow(std::max(1e-3, 1 - q * q), 3); };
-    for (const auto& [q, i] : near) sum += weight(q);
+    for (const auto& [q, i] : near) sum += carrier_weight(q);
     int left = 255;
     for (std::size_t k = 0; k < Carriers::each; ++k) {
       const bool there = k < near.size();
       made.phyxel.push_back(static_cast<std::uint32_t>(near[there ? k : 0].second));
       const int share =
-          there ? static_cast<int>(std::lround(255 * weight(near[k].first) / sum)) : 0;
+          there ? static_cast<int>(std::lround(255 * carrier_weight(near[k].first) / sum)) : 0;
       made.weight.push_back(static_cast<std::uint8_t>(std::min(left, share)));
       left -= made.weight.back();
     }

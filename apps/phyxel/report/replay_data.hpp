@@ -19,6 +19,12 @@ struct Carriers {
   std::vector<std::uint8_t> weight;
 };
 
+/// Distance within which phyxels are carriers, from the distance between them [m].
+double carrier_reach(double spacing);
+
+/// The weight of a carrier, but for a common factor. @param q distance over reach
+double carrier_weight(double q);
+
 /// The nearest phyxels of each surfel within `reach` [m]; the nearest one if there are none.
 Carriers carriers_of(const std::vector<Vec3d>& surfels, const std::vector<Vec3d>& phyxels,
                      double reach);

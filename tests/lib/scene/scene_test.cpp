@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <map>
 
+#include "phyxel/camera_request.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/shapes.hpp"
 #include "support/scene_text.hpp"
@@ -140,6 +141,31 @@ TEST(Scene, UpIsAgainstGravityAndTheViewTurnsWithIt) {
   expect_vector(render("gravity = [0, -2, 0]\n[render]\nview = [0, 0, -1]").up, {0, 1, 0});
   // A view along gravity, as there are in scenes from before, has the z that was up then.
   expect_vector(render("gravity = [0, -2, 0]\n[render]\nview = [0, -1, 0]").up, {0, 0, 1});
+}
+
+TEST(Scene, CamerasLookFromTheirPositionToTheirTarget) {
+  const std::string text = R"(
+[render.camera]
+position = [4, 0, 1]
+target = [1, 0, 1]
+field_of_view = 45
+orbit = -90
+follow = "c"
+[time]
+end = 1
+[[body]]
+cloud = "c"
+material = { young = 1, poisson = 0.3, density = 1 }
+)";
+  const CameraRequest camera = parse_camera(text, "scene.toml");
+  expect_vector(*camera.position, {4, 0, 1});
+  expect_vector(*camera.target, {1, 0, 1});
+  EXPECT_EQ(camera.field_of_view, 45);
+  EXPECT_EQ(camera.orbit, -90);
+  EXPECT_EQ(camera.follow, "c");
+  expect_vector(parse_render(text, "scene.toml").view, {-3, 0, 0});
+  const std::string none = text.substr(text.find("[time]"));
+  EXPECT_FALSE(parse_camera(none, "scene.toml").position);
 }
 
 TEST(Scene, BodyKeysAreReadExactly) {
