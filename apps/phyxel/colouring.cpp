@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "label.hpp"
+#include "phyxel/law_table.hpp"
 #include "phyxel/neighbourhood.hpp"
 
 namespace phyxel::app {
@@ -18,18 +19,6 @@ std::size_t components(const FrameData& frame, const std::vector<double>& values
   return points > 0 && values.size() % points == 0 ? values.size() / points : 0;
 }
 
-/// The unit of a field; "" of a number without one.
-std::string unit_of(const std::string& field) {
-  struct Unit {
-    const char *field, *unit;
-  };
-  constexpr Unit units[] = {{"displacement", "m"}, {"velocity", "m/s"}, {"speed", "m/s"},
-                            {"von_mises", "Pa"},   {"mass", "kg"},      {"volume", "m^3"}};
-  for (const Unit& known : units) {
-    if (field == known.field) return known.unit;
-  }
-  return "";
-}
 
 /// Viridis in sRGB, by a polynomial of degree six: Zucker's fit, as on the page of a report.
 std::array<double, 3> viridis(double t) {
@@ -77,6 +66,24 @@ void draw_ticks(Image& image, const ColourRange& range, const BarEdge& bar) {
 
 std::string stored_name(const std::string& field) { return field == "speed" ? "velocity" : field; }
 
+std::string unit_of(const std::string& field) {
+  struct Unit {
+    const char *field, *unit;
+  };
+  constexpr Unit units[] = {{"displacement", "m"},     {"velocity", "m/s"}, {"speed", "m/s"},
+                            {"von_mises", "Pa"},       {"mass", "kg"},      {"volume", "m^3"},
+                            {"principal_stress", "Pa"}};
+  for (const Unit& known : units) {
+    if (field == known.field) return known.unit;
+  }
+  for (const LawEntry& law : law_table()) {
+    for (const HistoryNumber& number : law.history) {
+      if (field == number.name) return number.unit;
+    }
+  }
+  return "";
+}
+
 std::string field_title(const std::string& field) {
   const std::string unit = unit_of(field);
   return unit.empty() ? field : fmt::format("{} [{}]", field, unit);
@@ -89,6 +96,18 @@ std::vector<std::string> colour_fields(const FrameData& frame) {
     if (each != 1 && each != 3) continue;
     names.push_back(name);
     if (name == "velocity") names.push_back("speed");
+  }
+  return names;
+}
+
+std::vector<std::string> other_numbers(const FrameData& frame) {
+  std::vector<std::string> names;
+  for (const auto& [name, values] : frame.field) {
+    const bool is_component = name.size() > 3 && name[name.size() - 3] == '_' &&
+                              name.find_first_not_of("xyz", name.size() - 2) == std::string::npos;
+    const bool is_known =
+        name == "von_mises" || name == "volume_ratio" || name == "mass" || name == "volume";
+    if (values.size() == frame.point.size() && !is_component && !is_known) names.push_back(name);
   }
   return names;
 }

@@ -30,6 +30,14 @@ std::string stored_name(const std::string& field);
 /// A field's name with its unit.
 std::string field_title(const std::string& field);
 
+/// The names of the numbers in a frame that a page shows beside displacement, speed, stress and
+/// volume ratio: what materials remember but for components of tensors, broken shares, marks of the
+/// boundary.
+std::vector<std::string> other_numbers(const FrameData& frame);
+
+/// The unit of a field; "" of a number without one.
+std::string unit_of(const std::string& field);
+
 /// A field's value at each point of a frame; unset if the frame lacks it.
 std::optional<std::vector<double>> field_values(const FrameData& frame, const std::string& field);
 

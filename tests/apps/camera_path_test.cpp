@@ -6,6 +6,7 @@
 
 #include "ball.hpp"
 #include "png_reader.hpp"
+#include "report/opening_view.hpp"
 #include "support/thrown_block.hpp"
 
 namespace phyxel::app {
@@ -156,6 +157,32 @@ TEST(FollowedBody, HasTheWayOfItsCentre) {
   frame.body = {0, 0, 0, 0};
   EXPECT_THAT(message_of([&] { body.add(nullptr, &frame); }),
               HasSubstr("--follow b: frame 2 has no point of it"));
+}
+
+TEST(OpeningView, IsThatOfTheScene) {
+  std::vector<Instance> instances(2);
+  instances[0].surfels = {{0, 0, 0}, {4, 4, 2}};
+  instances[1].surfels = {{1, 0, 0}, {4, 3, 2}};
+  const Extent extent = extent_of(instances);
+  ASSERT_NEAR(extent.radius, 3, 1e-12);
+  CameraWishes wishes;
+  wishes.camera.position = Vec3d{2, -7, 1};
+  wishes.camera.target = Vec3d{2, 2, 1};
+  wishes.camera.field_of_view = 44;
+  wishes.view = {0, 9, 0};
+  auto page = opening_view(wishes, instances, extent, {});
+  EXPECT_NEAR(page["view"]["distance"].get<double>(), 3, 1e-12);
+  EXPECT_EQ(page["view"]["field_of_view"], 44);
+  EXPECT_EQ(page["view"]["centred"], true);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(page["view"]["pivot"][k].get<double>(), 0, 1e-12);
+  EXPECT_FALSE(page.contains("follow"));
+  page = opening_view({}, instances, extent, {{0, 0, 0}, {0, 0, 3}});
+  EXPECT_FALSE(page["view"].contains("distance"));
+  EXPECT_EQ(page["view"]["centred"], false);
+  EXPECT_NEAR(page["follow"][1][2].get<double>(), 1, 1e-12);
+  double lowest = 0;
+  for (const auto& p : page["outermost"]) lowest = std::min(lowest, p[2].get<double>());
+  EXPECT_NEAR(lowest, (0 - 3 - 1) / 3.0, 1e-12);  // 3 m lower than where it is
 }
 
 /// A block that is thrown upwards, 40 mm in 0.02 s, in pictures of 0.4 m.

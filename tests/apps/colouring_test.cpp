@@ -30,6 +30,20 @@ TEST(Colouring, ShowsNumbersAndLengthsOfVectors) {
   EXPECT_FALSE(field_values(frame, "mass"));
 }
 
+TEST(Colouring, PagesShowWhatMaterialsRememberButForComponents) {
+  FrameData frame;
+  frame.point = {{0, 0, 0}, {1, 0, 0}};
+  for (const char* name : {"broken", "equivalent_plastic_strain", "plastic_strain_xy", "mass",
+                           "von_mises", "plastic_work"}) {
+    frame.field[name] = {1, 2};
+  }
+  frame.field["velocity"] = {3, 4, 0, 0, 0, 2};
+  EXPECT_THAT(other_numbers(frame),
+              ElementsAre("broken", "equivalent_plastic_strain", "plastic_work"));
+  EXPECT_EQ(unit_of("plastic_work"), "J/m^3");
+  EXPECT_EQ(unit_of("broken"), "");
+}
+
 TEST(Colouring, SurfelsTakeMeansOfPhyxelsUnlessTheyHaveTheField) {
   FrameData surface, phyxels;
   surface.point = {{0, 0, 0}};

@@ -361,11 +361,35 @@ TEST_F(Reports, ABrowserDrawsAReplay) {
     return std::stod(between(body, "data-drawn=\"", "\""));
   };
   EXPECT_THAT(replay, HasSubstr("data-obstacles=\"1\""));
+  EXPECT_THAT(replay, HasSubstr("data-faces=\"0.0000\""));
   const std::string alone = seen_by_browser(folder_, "page.html#t=0&obstacles=off");
   EXPECT_THAT(alone, HasSubstr("data-frame=\"0\""));
   EXPECT_GT(drawn(alone), 0.02);
   EXPECT_LT(drawn(alone), 0.7);
   EXPECT_GT(drawn(replay), drawn(alone) + 0.1);
+}
+
+/// Across its length, the cut through the middle of the beam shows a long face, and takes from the
+/// beam half of what is seen of it, but for that face.
+TEST_F(Reports, ABrowserCutsBodiesOpen) {
+  PHYXEL_NEEDS_TOOL(std::system("command -v chromium >/dev/null") == 0, "chromium");
+  run_beam();
+  page_of();
+  const auto share = [](const std::string& body, const char* name) {
+    return std::stod(between(body, "data-" + std::string(name) + "=\"", "\""));
+  };
+  const std::string whole = seen_by_browser(folder_, "page.html#t=0&obstacles=off");
+  const std::string cut = seen_by_browser(folder_, "page.html#t=0&obstacles=off&cut=y");
+  EXPECT_THAT(cut, HasSubstr("data-error=\"0\""));
+  EXPECT_GT(share(cut, "faces"), 0.2 * share(whole, "drawn"));
+  EXPECT_LT(share(cut, "faces"), 0.8 * share(whole, "drawn"));
+  EXPECT_LT(share(cut, "drawn"), share(whole, "drawn"));
+  // Before the near end nothing is cut away, beyond the far one all is.
+  const std::string before = seen_by_browser(folder_, "page.html#t=0&obstacles=off&cut=y:-99");
+  EXPECT_EQ(share(before, "faces"), 0);
+  EXPECT_EQ(share(before, "drawn"), share(whole, "drawn"));
+  const std::string beyond = seen_by_browser(folder_, "page.html#t=0&obstacles=off&cut=y:99");
+  EXPECT_EQ(share(beyond, "drawn"), 0);
 }
 
 }  // namespace

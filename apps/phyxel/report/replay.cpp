@@ -9,6 +9,7 @@
 #include "base64.hpp"
 #include "compose.hpp"
 #include "phyxel/error.hpp"
+#include "report/opening_view.hpp"
 #include "report/page.hpp"
 #include "report/rebuilt.hpp"
 #include "report/replay_data.hpp"
@@ -16,7 +17,6 @@
 #include "report/report.hpp"
 #include "report/run_files.hpp"
 #include "report/thinning.hpp"
-#include "scene/upright.hpp"
 #include "trajectory.hpp"
 #include "version.hpp"
 
@@ -43,6 +43,12 @@ std::vector<T> some(const std::vector<T>& values, const std::vector<std::size_t>
   std::vector<T> chosen;
   for (const std::size_t k : places) chosen.push_back(values[k]);
   return chosen;
+}
+
+/// The name of a field with spaces.
+std::string in_words(std::string name) {
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name;
 }
 
 /// A number with commas between thousands.
@@ -135,10 +141,7 @@ class Replay {
     } catch (const InputError& error) {
       why = error.what();  // files that the scene names may have been moved
     }
-    try {
-      pictures_ = parse_render(any().scene, "scene.toml");
-    } catch (const InputError&) {  // the defaults are used
-    }
+    camera_ = camera_wishes(any().scene, "scene.toml");
     if (!request_.stress || !first_phyxels_) return;
     const std::size_t phyxels = first_phyxels_->point.size();
     if (phyxels > most_rebuilt) {
@@ -265,8 +268,10 @@ class Replay {
     if (const auto* v = written("velocity")) fields.push_back({"speed", "m/s", lengths(*v)});
     if (const auto* s = written("von_mises")) fields.push_back({"stress (von Mises)", "Pa", *s});
     if (const auto* j = written("volume_ratio")) fields.push_back({"volume ratio", "", *j});
-    if (const auto* b = written("broken")) fields.push_back({"broken share", "", *b});
-    if (const auto* f = written("fragment")) fields.push_back({"fragment", "", *f});
+    for (const std::string& name : other_numbers(frame)) {
+      fields.push_back({name == "broken" ? "broken share" : in_words(name), unit_of(name),
+                        *written(name.c_str())});
+    }
     if (rebuilt_) rebuilt_->add_fields(frame, fields);
     return fields;
   }
@@ -284,11 +289,18 @@ class Replay {
 
   std::vector<Instance> read_instances() {
     std::vector<Instance> instances;
+    if (!camera_.camera.follow.empty()) {
+      followed_.emplace(camera_.camera.follow, any().scene, run_.scene_file());
+    }
     for (const std::size_t shot : chosen_) {
       Instance& instance = instances.emplace_back();
       instance.time = trajectory_.shots[shot].time;
       const auto surface = read(trajectory_.shots[shot].surface, first_surface_);
       const auto phyxels = read(trajectory_.shots[shot].phyxels, first_phyxels_);
+      if (followed_) {
+        followed_->add(surface ? &*surface : nullptr, phyxels ? &*phyxels : nullptr);
+        way_.push_back(followed_->way(way_.size()));
+      }
       if (surface) instance.surfels = some(surface->point, shown_surface_.surfel);
       if (surface && surface->triangle.size() != first_surface_->triangle.size()) cracks_ = true;
       if (phyxels) instance.phyxels = each(phyxels->point, stride_);
@@ -355,8 +367,7 @@ class Replay {
       embed_bodies("phyxels-bodies", each(first_phyxels_->body, stride_));
     }
     if (!start.surfels.empty() && !start.phyxels.empty()) {
-      const Carriers carriers =
-          carriers_of(start.surfels, start.phyxels, spacing > 0 ? 1.6 * spacing : 1);
+      const Carriers carriers = carriers_of(start.surfels, start.phyxels, carrier_reach(spacing));
       embed("carriers", carriers.phyxel);
       embed("weights", carriers.weight);
     }
@@ -370,8 +381,11 @@ class Replay {
 
   /// The data that the page's script reads. Lengths are in units of the radius, about the centre.
   Json data_of(const std::vector<Instance>& instances, const Extent& extent, double spacing) const {
-    const auto& [box, outermost, ranges, radius] = extent;
-    Json data;
+    const auto& [box, ranges, radius] = extent;
+    Json data = opening_view(camera_, instances, extent, way_);
+    const Vec3d centre = extent.centre();
+    data["centre"] = {centre.x, centre.y, centre.z};
+    data["radius"] = radius;
     data["surfels"] = instances.front().surfels.size();
     data["phyxels"] = instances.front().phyxels.size();
     data["decimals"] = time_decimals(trajectory_.shots);
@@ -397,24 +411,16 @@ class Replay {
       data["scale"].push_back(side.width() / Span::steps / radius);
       data["low"].push_back(-side.width() / 2 / radius);
     }
-    for (const Vec3d p : outermost.points()) {
-      const Vec3d centred = (1 / radius) * (p - extent.centre());
-      data["outermost"].push_back({centred.x, centred.y, centred.z});
-    }
     std::vector<double> times;
     for (const Instance& instance : instances) times.push_back(instance.time);
-    const bool floor = obstacles_.empty() && looks_down(pictures_.view, pictures_.up);
+    const bool floor = obstacles_.empty() && looks_down(camera_.view, camera_.up);
     data["obstacles"] = obstacles_json(
         floor ? std::vector{floor_of(instances, extent)} : obstacles_, paths_, times, extent);
     data["only_floor"] = floor;
     if (!uncut_.empty()) data["uncut"] = uncut_;
     data["spacing"] = spacing / radius;
+    data["reach"] = carrier_reach(spacing) / radius;
     data["carriers"] = Carriers::each;
-    const auto axes = upright_axes(pictures_.up);
-    const auto along = [&](int axis) { return -dot(pictures_.view, axes[axis]); };
-    data["view"] = {{"yaw", std::atan2(along(1), along(0))},
-                    {"pitch", std::atan2(along(2), std::hypot(along(0), along(1)))}};
-    for (const Vec3d axis : axes) data["axes"].push_back({axis.x, axis.y, axis.z});
     data["log"] = run_.log();
     data["timing"] = run_.timing();
     return data;
@@ -425,10 +431,10 @@ class Replay {
     Span height;
     for (const Instance& instance : instances) {
       for (const auto* points : {&instance.surfels, &instance.phyxels}) {
-        for (const Vec3d& p : *points) height.include(dot(p, normalised(pictures_.up)));
+        for (const Vec3d& p : *points) height.include(dot(p, normalised(camera_.up)));
       }
     }
-    return floor_below(pictures_.up, extent.centre(), height.low, 2 * extent.radius);
+    return floor_below(camera_.up, extent.centre(), height.low, 2 * extent.radius);
   }
 
   std::string summary_line(double end) const {
@@ -452,7 +458,9 @@ class Replay {
   std::optional<FrameData> first_surface_, first_phyxels_;
   RunFiles run_;
   std::optional<Scene> scene_;
-  RenderRequest pictures_;
+  CameraWishes camera_;
+  std::optional<FollowedBody> followed_;
+  std::vector<Vec3d> way_;  // of the followed body, by chosen frames
   std::optional<Rebuilt> rebuilt_;
   std::vector<Obstacle> obstacles_;
   RigidPaths paths_;  // of those that are free bodies

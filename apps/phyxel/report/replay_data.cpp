@@ -79,7 +79,6 @@ Extent extent_of(const std::vector<Instance>& instances) {
         extent.box[0].include(p.x);
         extent.box[1].include(p.y);
         extent.box[2].include(p.z);
-        extent.outermost.include(p);
       }
     }
     for (std::size_t f = 0; f < instance.fields.size(); ++f) {

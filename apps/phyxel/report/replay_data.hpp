@@ -67,7 +67,6 @@ class Outermost {
 /// The ranges of all points and fields of a replay.
 struct Extent {
   Span box[3];               ///< Ranges of x, y and z [m].
-  Outermost outermost;       ///< Points on the outside.
   std::vector<Span> ranges;  ///< Range of each field.
   double radius = 0;         ///< Half the diagonal of the box [m].
 

@@ -13,7 +13,7 @@
 #include "report/page.hpp"
 #include "report/replay_obstacles.hpp"
 #include "rigid_paths.hpp"
-#include "scene/upright.hpp"
+#include "report/opening_view.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -33,10 +33,13 @@ std::vector<float> scaled(const std::vector<Vec3d>& points, const Extent& extent
   return numbers;
 }
 
+/// The camera that the scene asks for.
+CameraWishes wishes_of(const Scene& scene) { return camera_wishes(scene.text, scene.file); }
+
 /// The obstacles that are drawn: those of the scene, or else a floor below its bodies.
 std::vector<Obstacle> drawn(const LiveScene& live, const Instance& rest, const Extent& extent,
                             bool& floor) {
-  const RenderRequest& look = live.scene().render;
+  const CameraWishes look = wishes_of(live.scene());
   floor = live.model().obstacles.empty() && looks_down(look.view, look.up);
   if (!floor) return live.model().obstacles;
   Span height;
@@ -64,9 +67,9 @@ Json settings_of(const Scene& scene) {
 }
 
 /// The data that the page's script reads. Lengths are in units of the radius, about the centre.
-Json data_of(const LiveScene& live, const LivePicture& picture, const Extent& extent,
-             const std::vector<Obstacle>& obstacles, bool floor) {
-  Json data;
+Json data_of(const LiveScene& live, const LivePicture& picture, const Instance& rest,
+             const Extent& extent, const std::vector<Obstacle>& obstacles, bool floor) {
+  Json data = opening_view(wishes_of(live.scene()), {rest}, extent, {});
   data["surfels"] = picture.surfels().size();
   data["phyxels"] = picture.phyxels().size();
   data["fields"] = Json::array();
@@ -81,21 +84,11 @@ Json data_of(const LiveScene& live, const LivePicture& picture, const Extent& ex
     data["scale"].push_back(side.width() / Span::steps / extent.radius);
     data["low"].push_back(-side.width() / 2 / extent.radius);
   }
-  for (const Vec3d p : extent.outermost.points()) {
-    const Vec3d centred = (1 / extent.radius) * (p - centre);
-    data["outermost"].push_back({centred.x, centred.y, centred.z});
-  }
   const double start[] = {0};
   data["obstacles"] = obstacles_json(obstacles, RigidPaths(), start, extent);
   data["only_floor"] = floor;
   data["spacing"] = picture.spacing() / extent.radius;
   data["carriers"] = Carriers::each;
-  const RenderRequest& look = live.scene().render;
-  const auto axes = upright_axes(look.up);
-  const auto along = [&](int axis) { return -dot(look.view, axes[axis]); };
-  data["view"] = {{"yaw", std::atan2(along(1), along(0))},
-                  {"pitch", std::atan2(along(2), std::hypot(along(0), along(1)))}};
-  for (const Vec3d axis : axes) data["axes"].push_back({axis.x, axis.y, axis.z});
   data["settings"] = settings_of(live.scene());
   data["step"] = live.solver().dt();
   return data;
@@ -138,7 +131,7 @@ std::string live_page(const LiveScene& live, const LivePicture& picture, const s
                      {{"title", html_text(title)},
                       {"summary", html_text(summary)},
                       {"elements", elements},
-                      {"data", script_json(data_of(live, picture, extent, obstacles, floor))},
+                      {"data", script_json(data_of(live, picture, rest, extent, obstacles, floor))},
                       {"scene", html_text(live.scene().text)},
                       {"footer", html_text(fmt::format("Simulated by {}.", program_version()))}});
 }

@@ -203,6 +203,7 @@ function drawPart(part, frame, at, lines = false) {
   gl.uniformMatrix3fv(at.pose, false, columns(turn));
   gl.uniform3fv(at.scale, [1, 1, 1]);
   gl.uniform3fv(at.low, origin);
+  gl.uniform4fv(at.cut, uncut);
   gl.disableVertexAttribArray(1);
   for (const [k, buffer] of [[0, part.points], [2, part.normals]]) {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
@@ -240,7 +241,7 @@ function drawObstacles(frame, use) {
 
 /// The fragment shader of obstacles.
 const obstacleColour = `
-in vec3 seen; in vec3 facing; in vec3 around; in vec3 upright;
+in vec3 seen; in vec3 facing; centroid in vec3 around; in vec3 upright;
 uniform vec3 plain, towards; uniform vec2 fade; uniform float ghost, pass; out vec4 colour;
 void main() {
   vec3 n = normalize(facing), v = normalize(-seen);

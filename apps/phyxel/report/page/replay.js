@@ -83,6 +83,7 @@ const source = {
   clock(frame) { return `t = ${frames[frame.number].toFixed(data.decimals)} s`; },
   span,
   upload,
+  about() { return data.follow?.[shown.frame]; },
   corners(frame) { return cornersOf(frame.number); },
   torn(frame) { return {count: tornOf(frame).length, buffer: buffers.torn}; },
   bindSurface() {
@@ -220,6 +221,7 @@ function control() {
   }
   document.getElementById('with-obstacles').hidden = !obstacles.length;
   if (data.only_floor) document.querySelector('#with-obstacles span').textContent = 'floor';
+  controlCut();
   watchPointers();
   document.addEventListener('keydown', event => {
     if (['INPUT', 'SELECT', 'TEXTAREA'].includes(event.target.tagName) && event.target.type !== 'range') return;
@@ -244,7 +246,7 @@ if (data.timing.length) addTiming();
 else document.getElementById('timing-title').hidden = true;
 if (gl) prepare();
 else stage.append(element('p', {class: 'refusal'}, 'This browser has no WebGL 2, which the moving picture needs; the plots below do not.'));
-const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&play&video
+const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&cut=y:0.1&play&video
 const colouring = asked.get('colours');
 if (colouring === 'bodies') shown.field = -1;
 else if (data.fields.some(f => f.name === colouring)) shown.field = data.fields.findIndex(f => f.name === colouring);

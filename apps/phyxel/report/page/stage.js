@@ -21,7 +21,7 @@ function bodiesOf(family) {
 }
 
 // --- drawing -------------------------------------------------------------------------------------
-const gl = canvas.getContext('webgl2', {antialias: true, preserveDrawingBuffer: true});
+const gl = canvas.getContext('webgl2', {antialias: true, stencil: true, preserveDrawingBuffer: true});
 const view = {}, fromTheRight = [0.398, 0.697, 0.597];  // the light of a page without obstacles
 const shown = {frame: 0, field: data.fields.length ? data.opening.field : -1, log: false, surface: data.surfels > 0, phyxels: data.surfels === 0, obstacles: obstacles.length > 0, range: 'bulk'};
 let programs = null, cornerBuffer = null;
@@ -46,17 +46,23 @@ function compile(vertex, fragment) {
   return {program, at};
 }
 
+/// The position of a field's value in the range of colours.
+const rangeOfColours = `
+uniform vec2 range; uniform float origin;  // origin: lowest value of a field over its width; negative for linear colours
+float shareOf(float field) {
+  return origin < 0.0 ? (field - range.x) / max(range.y - range.x, 1e-6)
+                      : log(max(field + origin, 1e-7) / (range.x + origin)) / log((range.y + origin) / (range.x + origin));
+}`;
+
 /// A vertex shader's part that places a point. motion: moved(), its place in units of `scale`; turned(normal); shade(), its field.
-const place = motion => motion + `
-uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel; uniform vec2 range; uniform float origin;  // origin: lowest value of a field over its width; negative for linear colours
-out float value; out vec3 seen, around;
+const place = motion => motion + rangeOfColours + `
+uniform vec3 scale, low, eye; uniform mat3 turn, pose; uniform vec4 lens; uniform float parallel;
+out float value; out vec3 seen; centroid out vec3 around;  // within triangles, also at their edges
 void put() {
   around = pose * (moved() * scale) + low;
   seen = turn * around - eye;  // looking along -z
   gl_Position = vec4(lens.x * seen.x, lens.y * seen.y, lens.z * seen.z + lens.w, mix(-seen.z, 1.0, parallel));  // parallel: of a light far away
-  float field = shade();
-  value = origin < 0.0 ? (field - range.x) / max(range.y - range.x, 1e-6)
-                       : log(max(field + origin, 1e-7) / (range.x + origin)) / log((range.y + origin) / (range.x + origin));
+  value = shareOf(shade());
 }`;
 /// Points that stay where they are.
 const still = `
@@ -69,9 +75,10 @@ function prepare() {
   const placeOfSurface = motion => place(motion) + `
 in vec4 normal; out vec3 facing, upright;
 void main() { put(); upright = pose * turned(normal.xyz); facing = turn * upright; }`;
-  const surface = compile(placeOfSurface(source.surfaceMotion), ramp + shadows + `
-in float value; in vec3 seen, facing, around, upright; uniform vec3 towards; out vec4 colour;
+  const surface = compile(placeOfSurface(source.surfaceMotion), ramp + shadows + cutAway + `
+in float value; in vec3 seen, facing, upright; centroid in vec3 around; uniform vec3 towards; out vec4 colour;
 void main() {
+  if (isCut(around)) discard;
   vec3 n = normalize(facing), v = normalize(-seen), out_ = normalize(upright);
   if (dot(n, v) < 0.0) { n = -n; out_ = -out_; }
   vec3 base = baseColour(value);
@@ -87,19 +94,23 @@ void main() { put(); gl_PointSize = clamp(ball / gl_Position.w, 2.0, 200.0); }`;
   vec2 p = 2.0 * gl_PointCoord - 1.0;
   float rest = 1.0 - dot(p, p);
   if (rest < 0.0) discard;`;
-  const balls = compile(placeOfBall, ramp + `
-in float value; in vec3 seen; uniform vec3 towards; out vec4 colour;
+  const balls = compile(placeOfBall, ramp + cutAway + `
+in float value; in vec3 seen; centroid in vec3 around; uniform vec3 towards; out vec4 colour;
 void main() {${round}
+  if (isCut(around)) discard;
   vec3 n = vec3(p.x, -p.y, sqrt(rest));
   vec3 base = baseColour(value);
   colour = vec4(base * (0.4 + 0.6 * max(0.0, dot(n, towards))), 1.0);
 }`);
-  programs = {surface, balls};
+  const castingSurface = compile(placeOfSurface(source.surfaceMotion), cutAway + `
+centroid in vec3 around;
+void main() { if (isCut(around)) discard; }`);
+  const face = compile(place(still) + '\nvoid main() { put(); }', ramp + rangeOfColours + faceColour);
+  programs = {surface, balls, castingSurface, face};
   if (obstacles.length) {
     programs.obstacle = compile(placeOfSurface(still), shadows + obstacleColour);
     programs.casting = compile(placeOfSurface(still), 'void main() {}');
-    programs.castingSurface = compile(placeOfSurface(source.surfaceMotion), 'void main() {}');
-    programs.castingBalls = compile(placeOfBall, `void main() {${round}\n}`);
+    programs.castingBalls = compile(placeOfBall, `${cutAway}\ncentroid in vec3 around;\nvoid main() {${round}\n  if (isCut(around)) discard;\n}`);
     prepareScenery();
   }
   source.prepare();
@@ -122,17 +133,21 @@ function attribute(k, buffer, size, type, normalised) {
 }
 
 const dot3 = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-const focal = 1 / Math.tan(35 * Math.PI / 360);  // 35 degrees from bottom to top
+/// A vector along the rows of a matrix.
+function turnedBy(rows, v) { return rows.map(row => dot3(row, v)); }
 
-/// The outermost points along the axes of the first view: right, up, backwards.
-const outermost = data.outermost.map(p => matrix(data.view).map(row => row[0] * p[0] + row[1] * p[1] + row[2] * p[2]));
+/// Of a lens whose field of view is along the shorter side of the stage.
+const focal = aspect => Math.min(1, aspect) / Math.tan(data.view.field_of_view * Math.PI / 360);
+
+/// The outermost points about the point around which the view turns, along the axes of the first view: right, up, backwards.
+const outermost = data.outermost.map(p => turnedBy(matrix(data.view), p.map((v, k) => v - data.view.pivot[k])));
 const middle = [0, 1].map(axis => {
   const all = outermost.map(p => p[axis]);
-  return (Math.min(...all) + Math.max(...all)) / 2;
+  return data.view.centred ? 0 : (Math.min(...all) + Math.max(...all)) / 2;
 });
-/// From how far all of them are seen in that view.
-function distanceForAll(aspect) {
-  return Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
+/// The distance of the first view: the scene's, or that from which all of them are seen.
+function firstDistance(aspect) {
+  return data.view.distance ?? Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal(aspect) * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
 }
 
 /// Rows: right, up, backwards. Yaw and pitch are about data.axes, the last of which is up.
@@ -142,14 +157,16 @@ function matrix(from) {
   return rows.map(row => [0, 1, 2].map(k => row[0] * data.axes[0][k] + row[1] * data.axes[1][k] + row[2] * data.axes[2][k]));
 }
 
-/// The place that the view is about, in units of the radius: the middle, or what a page follows.
+/// How far what a page follows has come, in units of the radius.
 function about() { return source.about?.() ?? [0, 0, 0]; }
+/// The point around which the view turns.
+function pivot() { return about().map((x, k) => x + data.view.pivot[k]); }
 /// From how far it is seen.
-function distanceFor(aspect) { return view.distance * distanceForAll(aspect) * (source.farther?.() ?? 1); }
+function distanceFor(aspect) { return view.distance * firstDistance(aspect) * (source.farther?.() ?? 1); }
 /// The eye in the camera's directions.
 function eyeOf(rows, aspect) {
-  const from = about();
-  return [view.shift[0], view.shift[1], distanceFor(aspect)].map((x, k) => x + dot3(rows[k], from));
+  const before = turnedBy(rows, pivot());
+  return [before[0] + view.shift[0], before[1] + view.shift[1], before[2] + distanceFor(aspect)];
 }
 
 function startView() { Object.assign(view, {...data.view, distance: 1, shift: [...middle]}); }
@@ -167,12 +184,12 @@ function draw() {
   if (canvas.width !== width || canvas.height !== height) { canvas.width = width; canvas.height = height; }
   source.upload(frame);
   gl.enable(gl.DEPTH_TEST);
-  const aspect = width / height, distance = distanceFor(aspect);
-  const scene = shown.obstacles;
-  const near = scene ? 0.02 * distance : Math.max(0.01, distance - 2.5), far = distance + (scene ? fade[1] + 1 : 2.5);
+  const aspect = width / height, distance = distanceFor(aspect), lens = focal(aspect);
+  const scene = shown.obstacles, reach = 2.5 + Math.hypot(...pivot());
+  const near = scene ? 0.02 * distance : Math.max(0.01, distance - reach), far = distance + (scene ? fade[1] + reach : reach);
   const rows = matrix(view), turn = columns(rows.flat());
   const spread = field ? Math.max(to - from, 1e-300) : 1;
-  const eye = {turn, eye: eyeOf(rows, aspect), lens: [focal / aspect, focal, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
+  const eye = {turn, eye: eyeOf(rows, aspect), lens: [lens / aspect, lens, -(far + near) / (far - near), -2 * far * near / (far - near), 0]};
   const use = (seenFrom, {program, at}) => {
     gl.useProgram(program);
     gl.uniformMatrix3fv(at.pose, false, [1, 0, 0, 0, 1, 0, 0, 0, 1]);
@@ -185,8 +202,9 @@ function draw() {
     gl.uniform1f(at.bodies, field ? 0 : 1);
     gl.uniform1f(at.origin, logarithmic ? from / spread : -1);
     gl.uniform1f(at.parallel, seenFrom.lens[4]);
+    gl.uniform4fv(at.cut, cutPlane(frame.number));
     gl.uniform2f(at.range, field ? (low - from) / spread : 0, field ? (high - from) / spread : 1);
-    gl.uniform3fv(at.towards, scene ? rows.map(row => row[0] * light.towards[0] + row[1] * light.towards[1] + row[2] * light.towards[2]) : fromTheRight);
+    gl.uniform3fv(at.towards, scene ? turnedBy(rows, light.towards) : fromTheRight);
     return at;
   };
   const drawSurface = at => {
@@ -212,19 +230,21 @@ function draw() {
   }
   gl.viewport(0, 0, width, height);
   gl.clearColor(0, 0, 0, 0);
-  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+  gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT | gl.STENCIL_BUFFER_BIT);
   if (surface) {
     const at = use(eye, programs.surface);
     bindShadows(at, scene);
     drawSurface(at);
+    drawFaces(frame, program => use(eye, program), drawSurface, v => turnedBy(rows, v));
   }
   const torn = source.torn?.(frame);
-  if (surface && torn?.count) drawBalls(use(eye, programs.balls), data.spacing * 0.84 * focal * height / 2, torn);
+  if (surface && torn?.count) drawBalls(use(eye, programs.balls), data.spacing * 0.84 * lens * height / 2, torn);
   if (balls) {
     const at = use(eye, programs.balls);
-    drawBalls(at, data.spacing * 0.7 * focal * height / 2 * (shown.surface ? 0.5 : 1));
+    drawBalls(at, data.spacing * 0.7 * lens * height / 2 * (shown.surface ? 0.5 : 1));
   }
   if (scene) drawObstacles(frame.number, program => { const at = use(eye, program); bindShadows(at, true); return at; });
+  drawAxes(rows);
 }
 
 // --- pointers ------------------------------------------------------------------------------------
@@ -258,16 +278,36 @@ function watchPointers() {
   new ResizeObserver(draw).observe(canvas);
 }
 
+function pixelsOfStage() {
+  const pixels = new Uint8Array(4 * canvas.width * canvas.height);
+  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  return pixels;
+}
+
+/// The share of the stage that faces of a cut take.
+function facesShare() {
+  if (cutting.axis < 0) return 0;
+  const full = pixelsOfStage();
+  cutting.faces = false;
+  draw();
+  const hollow = pixelsOfStage();
+  cutting.faces = true;
+  draw();
+  let count = 0;
+  for (let k = 0; k < full.length; k += 4) if ([0, 1, 2, 3].some(c => full[k + c] !== hollow[k + c])) ++count;
+  return count / (canvas.width * canvas.height);
+}
+
 /// For whoever tests the page: how much of the stage is drawn on, and what went wrong.
 function tell(state) {
   document.body.dataset.state = state;
   if (!gl) return;
-  const pixels = new Uint8Array(4 * canvas.width * canvas.height);
-  gl.readPixels(0, 0, canvas.width, canvas.height, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+  const pixels = pixelsOfStage();
   let drawn = 0;
   for (let k = 3; k < pixels.length; k += 4) if (pixels[k]) ++drawn;
   document.body.dataset.drawn = (drawn / (canvas.width * canvas.height)).toFixed(4);
   document.body.dataset.frame = shown.frame;
   document.body.dataset.obstacles = scenery.parts.length;
+  document.body.dataset.faces = facesShare().toFixed(4);
   document.body.dataset.error = gl.getError();
 }

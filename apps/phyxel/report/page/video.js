@@ -16,6 +16,8 @@ function copyStage(to) {
     pen.fillText(element.textContent, (x - box.left) * size, (at.bottom - box.top) * size);
   };
   write(stage.querySelector('.clock'));
+  const axes = axesCanvas.getBoundingClientRect();
+  pen.drawImage(axesCanvas, (axes.left - box.left) * size, (axes.top - box.top) * size, axes.width * size, axes.height * size);
   const legend = stage.querySelector('.legend');
   if (legend.hidden) return;
   const bar = legend.querySelector('canvas'), at = bar.getBoundingClientRect();

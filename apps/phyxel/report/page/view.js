@@ -161,7 +161,7 @@ stage.append(overlay);
 /// The ray through a place on the stage: the eye, and a direction, in units of the radius.
 function rayAt(event) {
   const box = canvas.getBoundingClientRect(), aspect = box.width / box.height, rows = matrix(view), eye = eyeOf(rows, aspect);
-  const x = (2 * (event.clientX - box.left) / box.width - 1) * aspect / focal, y = (1 - 2 * (event.clientY - box.top) / box.height) / focal;
+  const x = (2 * (event.clientX - box.left) / box.width - 1) * aspect / focal(aspect), y = (1 - 2 * (event.clientY - box.top) / box.height) / focal(aspect);
   const from = v => [0, 1, 2].map(k => rows[0][k] * v[0] + rows[1][k] * v[1] + rows[2][k] * v[2]);
   return {eye: from(eye), way: from([x, y, -1]), back: rows[2]};
 }
@@ -169,7 +169,8 @@ function rayAt(event) {
 function onStage(p) {
   const aspect = canvas.clientWidth / canvas.clientHeight, rows = matrix(view), eye = eyeOf(rows, aspect);
   const seen = rows.map((row, k) => dot3(row, p) - eye[k]);
-  return [(1 + focal / aspect * seen[0] / -seen[2]) / 2 * canvas.clientWidth, (1 - focal * seen[1] / -seen[2]) / 2 * canvas.clientHeight];
+  const lens = focal(aspect);
+  return [(1 + lens / aspect * seen[0] / -seen[2]) / 2 * canvas.clientWidth, (1 - lens * seen[1] / -seen[2]) / 2 * canvas.clientHeight];
 }
 const less = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
 const cross3 = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
