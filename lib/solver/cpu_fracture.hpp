@@ -60,6 +60,7 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
   using Passes::boundary_runs_;
   using Passes::closing_;
   using Passes::interior_runs_;
+  using Passes::inverse_;
   using Passes::inverse_mass_;
   using Passes::inverse_moment_;
   using Passes::layout_;
@@ -148,7 +149,8 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
     fractured_ = broken_.phyxels();
     changed.insert(changed.end(), fractured_.begin(), fractured_.end());
     for (const Index i : changed) {
-      write_row(i);
+      write_row(lists_, model_.neighbourhood.neighbours.row(i), i);
+      if (!inverse_.start.empty()) write_row(inverse_, model_.neighbourhood.inverse().row(i), i);
       write_constants(i, broken_.of_point(i));
     }
   }
@@ -253,6 +255,8 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
       lists_.indices[static_cast<std::size_t>(entry.at)] = layout_.slot(i);
     }
     broken_.add(i, neighbours);
+    // Bodies that break have symmetric lists, but others of the scene may not.
+    if (!inverse_.start.empty()) write_row(inverse_, model_.neighbourhood.inverse().row(i), i);
     PointBreakage has = broken_.of_point(i);
     const PointEnergy after = energies_->of(i, broken_, has, displacement);
     const double all = had.carried * before.elastic + before.hourglass;
@@ -264,10 +268,10 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
   }
 
   /// Writes the list of a phyxel without its broken pairs.
-  void write_row(Index i) {
+  void write_row(PackedLists& lists, std::span<const Index> row, Index i) {
     const Index slot = layout_.slot(i), p = slot / W;
-    const std::span<const Index> row = model_.neighbourhood.neighbours.row(i), gone = broken_.of(i);
-    Index* at = lists_.indices.data() + lists_.start[p] + slot % W;
+    const std::span<const Index> gone = broken_.of(i);
+    Index* at = lists.indices.data() + lists.start[p] + slot % W;
     for (std::size_t k = 0; k < row.size(); ++k) {
       const bool is_gone = std::binary_search(gone.begin(), gone.end(), row[k]);
       at[k * W] = is_gone ? slot : layout_.slot(row[k]);

@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "phyxel/diagnostics.hpp"
+#include "phyxel/equilibrium.hpp"
 #include "phyxel/scene.hpp"
 #include "phyxel/solver.hpp"
 #include "support/backend.hpp"
