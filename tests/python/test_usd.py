@@ -1,4 +1,5 @@
 """USD stages of trajectories, read back by USD itself."""
+import shutil
 import sys
 
 import numpy as np
@@ -84,6 +85,24 @@ def test_a_stage_has_triangles_normals_and_fields(run, tmp_path):
     assert np.array(points.GetVelocitiesAttr().Get(3)) == pytest.approx(0.1 * phyxels.fields["velocity"][inside], rel=1e-6)
     assert points.GetPurposeAttr().Get() == "guide"
     assert points.GetWidthsAttr().Get()[0] == pytest.approx(0.5, rel=0.01)  # the spacing
+
+
+def test_triangles_change_where_those_of_the_frames_do(run, tmp_path):
+    # A block that lies has as many surfels as one that stands, and other triangles.
+    Usd, UsdGeom = usd()
+    far, near = SCENE["body"]
+    other = phyxel.run({**SCENE, "body": [far, {**near, "size": [2, 1, 1]}]}, tmp_path / "other")
+    for k in 2, 3:
+        shutil.copy(other.directory / f"surface_00000{k}.hdf", run.directory)
+    stage = Usd.Stage.Open(str(phyxel.to_usd(run, tmp_path / "run.usdc")))
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/phyxel/body_2/surface"))
+    found = [list(mesh.GetFaceVertexIndicesAttr().Get(k)) for k in range(5)]
+    for k, frame in enumerate(run.surface):
+        mine = np.flatnonzero(of_body(frame, 1))
+        triangles = frame.triangles[of_body(frame, 1)[frame.triangles].all(axis=1)]
+        assert np.array_equal(mine[np.reshape(found[k], (-1, 3))], triangles)
+    assert found[0] == found[1] == found[4] and found[2] == found[3] != found[1]
+    assert mesh.GetFaceVertexIndicesAttr().GetTimeSamples() == [0, 2, 4]  # only where they change
 
 
 def test_a_stage_obeys_the_rules_of_usd(run, tmp_path):

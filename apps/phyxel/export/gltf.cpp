@@ -252,7 +252,8 @@ class Exporter {
     if (frame.triangle != first_.triangle || frame.point.size() != first_.point.size() ||
         frame.body != first_.body) {
       throw InputError(fmt::format(
-          "{}: has other points or triangles than the first frame; allowed: frames that share them",
+          "{}: has other points or triangles than the first frame, as those of bodies that break; "
+          "allowed: frames that share them (--frames), --format vtu, or USD from Python",
           file.string()));
     }
     if (frame.normal.empty()) frame.normal = vertex_normals(frame.point, frame.triangle);

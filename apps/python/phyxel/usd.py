@@ -85,6 +85,7 @@ class _Stage:
                 numbers |= set(numpy.unique(frame.body).tolist())
         self.bodies = [_Body(number, surface, phyxels) for number in sorted(numbers)]
         self.surface, self.phyxels = surface, phyxels
+        self.latest = surface  # the frame whose triangles are the last ones set
         for body in self.bodies:
             self._define(body)
 
@@ -95,12 +96,7 @@ class _Stage:
         colour = self.vt.Vec3fArray([self.gf.Vec3f(*body_colour(body.number))])
         if len(body.surfels):
             body.mesh = self.geom.Mesh.Define(self.stage, path + "/surface")
-            position = numpy.full(len(self.surface), -1)
-            position[body.surfels] = numpy.arange(len(body.surfels))
-            corners = position[self.surface.triangles]
-            corners = corners[(corners >= 0).all(axis=1)]
-            body.mesh.CreateFaceVertexCountsAttr(self._array("IntArray", numpy.full(len(corners), 3)))
-            body.mesh.CreateFaceVertexIndicesAttr(self._array("IntArray", corners.ravel()))
+            self._set_triangles(body, self.surface)
             body.mesh.CreateSubdivisionSchemeAttr(self.geom.Tokens.none)
             body.mesh.SetNormalsInterpolation(self.geom.Tokens.vertex)
             body.mesh.CreateDisplayColorAttr(colour)
@@ -114,14 +110,29 @@ class _Stage:
             if len(body.surfels):  # inside the surface: shown on request
                 body.points.CreatePurposeAttr(self.geom.Tokens.guide)
 
+    def _set_triangles(self, body, frame, *code):
+        """Sets the triangles of a body, at a time code if one is given."""
+        position = numpy.full(len(frame), -1)
+        position[body.surfels] = numpy.arange(len(body.surfels))
+        corners = position[frame.triangles]
+        corners = corners[(corners >= 0).all(axis=1)]
+        body.mesh.GetFaceVertexCountsAttr().Set(self._array("IntArray", numpy.full(len(corners), 3)), *code)
+        body.mesh.GetFaceVertexIndicesAttr().Set(self._array("IntArray", corners.ravel()), *code)
+
     def _array(self, kind, values):
         types = {"IntArray": numpy.int32, "Int64Array": numpy.int64}
         return getattr(self.vt, kind).FromNumpy(
             numpy.ascontiguousarray(values, types.get(kind, numpy.float32)))
 
     def add(self, surface: Frame | None, phyxels: Frame | None, code: float) -> None:
-        """Adds the samples of a frame."""
+        """Adds the samples of a frame. Triangles have samples from the first frame on where they change,
+        as those of bodies that break."""
+        cut = surface is not None and not numpy.array_equal(surface.triangles, self.latest.triangles)
         for body in self.bodies:
+            if cut and len(body.surfels):
+                if self.latest is self.surface:
+                    self._set_triangles(body, self.surface, self.stage.GetStartTimeCode())
+                self._set_triangles(body, surface, code)
             if surface is not None and len(body.surfels):
                 self._sample(body, body.mesh, surface, body.surfels, code)
                 if len(surface.normals):
@@ -129,6 +140,8 @@ class _Stage:
                         self._array("Vec3fArray", surface.normals[body.surfels]), code)
             if phyxels is not None and len(body.phyxels):
                 self._sample(body, body.points, phyxels, body.phyxels, code)
+        if cut:
+            self.latest = surface
 
     def _sample(self, body, prim, frame, which, code):
         points = self._array("Vec3fArray", frame.points[which] - body.origin)
@@ -209,9 +222,8 @@ def _write(file, trajectory, up, rate, fps, codes):
         if stage is None:
             stage = _Stage(file, surface, phyxels, up, rate, fps, codes)
         for now, first in (surface, stage.surface), (phyxels, stage.phyxels):
-            if now is not None and not (len(now) == len(first)
-                                        and numpy.array_equal(now.triangles, first.triangles)):
-                raise InputError(f"{trajectory.directory}: frame {k} has other points or triangles than "
-                                 "the first one; allowed: frames that share them")
+            if now is not None and len(now) != len(first):
+                raise InputError(f"{trajectory.directory}: frame {k} has {len(now)} points, the first "
+                                 f"one {len(first)}; allowed: frames with as many")
         stage.add(surface, phyxels, float(code))
     stage.stage.GetRootLayer().Save()
