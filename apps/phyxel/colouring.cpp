@@ -19,7 +19,6 @@ std::size_t components(const FrameData& frame, const std::vector<double>& values
   return points > 0 && values.size() % points == 0 ? values.size() / points : 0;
 }
 
-
 /// Viridis in sRGB, by a polynomial of degree six: Zucker's fit, as on the page of a report.
 std::array<double, 3> viridis(double t) {
   constexpr double c[3][7] = {

@@ -16,8 +16,7 @@ Colouring field_colours(const std::vector<Shot>& shots, const std::vector<std::s
   const auto surface = read_if_any(shots.front().surface, true),
              phyxels = read_if_any(shots.front().phyxels, true);
   if (surface && phyxels && !surface->point.empty() && !phyxels->point.empty()) {
-    colouring.carriers =
-        carriers_of(surface->point, phyxels->point, carrier_reach(spacing));
+    colouring.carriers = carriers_of(surface->point, phyxels->point, carrier_reach(spacing));
   }
   const auto shown = [&](const std::optional<FrameData>& a, const std::optional<FrameData>& b) {
     return shown_values(a ? &*a : nullptr, b ? &*b : nullptr, colouring);

@@ -74,8 +74,9 @@ class Stage {
     }
     if (!request.cut.empty()) cut_ = cut_plane(request.cut, cameras_.front().eye);
     if (!request.colour.empty()) {
-      setting_.colouring = field_colours(
-          shots, chosen, {request.colour, request.range, request.scale, request.cut}, setting_.spacing);
+      setting_.colouring =
+          field_colours(shots, chosen, {request.colour, request.range, request.scale, request.cut},
+                        setting_.spacing);
     }
   }
 

@@ -55,6 +55,9 @@ TEST(Hand, GivesTheBodyItsWorkAndItsImpulse) {
   for (const Vec3d by : {Vec3d{0.05, 0, 0.02}, Vec3d{0.1, 0.1, 0}, Vec3d{-0.1, 0, 0.1}}) {
     live.apply(move(by));
     live.advance(151);  // not a multiple of the hand's interval
+    // Energies at a time know nothing of half a step of the hand's present force.
+    const double energy = live.look().total_energy();
+    EXPECT_NEAR(energy / live.hand_work(), 1, 0.02);
   }
   live.apply({RequestKind::drop});
   const Diagnostics after = live.look();

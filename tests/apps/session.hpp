@@ -27,7 +27,10 @@ inline const char* session_scene() {
 /// saves after `saves` steps, while the hand holds the block, and at the end.
 inline app::Recording session() {
   const app::LiveScene live(parse_scene(session_scene(), "scene.toml"), {}, false);
-  app::Recording recording{program_version(), live.shared().digest(), "float", {}};
+  app::Recording recording{program_version(),
+                           {live.shared().digest(), "float", "verlet", live.solver().dt(),
+                            scene_parameters(live.scene())},
+                           {}};
   const auto add = [&](std::int64_t step, app::Request request) {
     recording.acts.push_back({step, std::move(request)});
   };

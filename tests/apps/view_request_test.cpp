@@ -65,18 +65,35 @@ Recording session() {
   Request grab{RequestKind::grab}, move{RequestKind::move};
   grab.phyxel = 4;
   move.by = {0.1, 0.2, 0.3};
-  return {"phyxel 0.1.0",
-          0xfedcba9876543210,
-          "float",
-          {{12, grab}, {13, move}, {400, {RequestKind::drop}}, {401, {RequestKind::save}}}};
+  return {
+      "phyxel 0.1.0",
+      {0xfedcba9876543210, "float", "verlet", 0.1, {{"time.end", "1"}, {"gravity", "[0, 0, 1]"}}},
+      {{12, grab}, {13, move}, {400, {RequestKind::drop}}, {401, {RequestKind::save}}}};
 }
 
 TEST(Recordings, ComeBackAsTheyWere) {
   const Recording written = session(), read = parse_recording(text_of(written), "s.jsonl");
   EXPECT_EQ(read.program, written.program);
-  EXPECT_EQ(read.model, written.model);
-  EXPECT_EQ(read.precision, written.precision);
+  EXPECT_EQ(read.of.model, written.of.model);
+  EXPECT_EQ(read.of.parameters, written.of.parameters);
+  EXPECT_EQ(differences(written.of, read.of), "");
   EXPECT_EQ(read.acts, written.acts);
+}
+
+TEST(Recordings, OfOtherRunsSayWhatDiffers) {
+  const RecordedRun then = session().of;
+  RecordedRun now = then;
+  now.dt = 0.05;
+  EXPECT_THAT(differences(then, now), HasSubstr("time step [s]: 0.1 then, 0.05 now"));
+  now = then;
+  now.method = "implicit";
+  EXPECT_THAT(differences(then, now), HasSubstr("verlet then, implicit now"));
+  now = then;
+  now.parameters[1].value = "[0, 0, 2]";
+  EXPECT_THAT(differences(then, now), HasSubstr("gravity: [0, 0, 1] then, [0, 0, 2] now"));
+  now = then;
+  ++now.model;
+  EXPECT_THAT(differences(then, now), HasSubstr("digest"));
 }
 
 TEST(Recordings, ThatAreWrongNameTheLine) {
@@ -90,6 +107,9 @@ TEST(Recordings, ThatAreWrongNameTheLine) {
     return "accepted";
   };
   EXPECT_THAT(refused(""), HasSubstr("s.jsonl:1:"));
+  // So deep that a parser which calls itself would overflow the stack.
+  EXPECT_THAT(refused(good + "{\"step\": 500, \"do\": " + std::string(3'000'000, '[')),
+              HasSubstr("s.jsonl:6: 3000"));
   EXPECT_THAT(refused("{\"format\": \"other\"}\n"), HasSubstr("\"other\""));
   EXPECT_THAT(refused(good + "{\"do\": \"drop\"}\n"), HasSubstr("s.jsonl:6: the key \"step\""));
   EXPECT_THAT(refused(good + "{\"step\": 500, \"do\": \"play\"}\n"),

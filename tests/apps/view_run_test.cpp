@@ -81,7 +81,7 @@ TEST_F(View, RefusesSessionsOfOtherScenes) {
   const Outcome outcome =
       run({"view", "other.toml", "--replay", "session.jsonl", "--headless", "--out", "o"});
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("another model"));
+  EXPECT_THAT(outcome.err, HasSubstr("recorded in another run"));
   const Outcome missing = run({"view", "scene.toml", "--replay", "none.jsonl", "--headless"});
   EXPECT_EQ(missing.code, 2);
   EXPECT_THAT(missing.err, HasSubstr("none.jsonl"));

@@ -125,6 +125,23 @@ TEST_F(Server, LetsOnePageSteerAndOthersWatch) {
   EXPECT_EQ(server_.joins(), 2u);
 }
 
+TEST_F(Server, KeepsTheLastPlaceOfAHandAndThatItLetsGo) {
+  auto page = joined("steers");
+  say(*page, R"({"do":"grab","phyxel":1})");
+  for (int k = 0; k < 3000; ++k) {
+    say(*page, R"({"do":"move","by":[)" + std::to_string(k) + ",0,0]}");
+  }
+  for (int k = 0; k < 1500; ++k) say(*page, R"({"do":"play"})");
+  say(*page, R"({"do":"drop"})");
+  page->close(beast::websocket::close_code::normal);  // what was said before is read before
+  EXPECT_TRUE(comes_true([&] { return server_.watchers() == 0; }));
+  const std::vector<std::string> messages = server_.take_messages();
+  ASSERT_GT(messages.size(), 3u);
+  EXPECT_LE(messages.size(), 1002u);
+  EXPECT_EQ(messages[1], R"({"do":"move","by":[2999,0,0]})");
+  EXPECT_EQ(messages[messages.size() - 2], R"({"do":"drop"})");
+}
+
 TEST_F(Server, SendsNoFrameToAPageThatHasNotDrawnTheLastTwo) {
   EXPECT_FALSE(server_.wants_frame());
   auto page = joined("steers");

@@ -17,6 +17,9 @@ void view(const ViewOptions& options) {
     throw AgreedError(ExitCode::bad_input,
                       "--headless: there is nothing to do; allowed with --replay SESSION");
   }
+  if (!(options.pace > 0)) {
+    throw AgreedError(ExitCode::bad_input, "--pace nan: allowed: 1e-06 to 1000");
+  }
   std::unique_ptr<Session> session;
   {
     const SetupProgress progress(all_ranks().leads() ? stderr : nullptr);

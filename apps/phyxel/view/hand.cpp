@@ -119,6 +119,9 @@ void Hand::pull(Backend& backend, double lag) {
   if (const double size = norm(force); size > largest_force_) {
     force = (largest_force_ / size) * force;
   }
+  if (!is_finite(force)) {  // on all ranks
+    throw DivergedError("the simulation diverged: the state is not finite where the hand holds it");
+  }
   force_ = force;
   pulled_at_ = now.before;
   since_ = 0;
@@ -130,6 +133,10 @@ void Hand::pull(Backend& backend, double lag) {
 void Hand::stepped(int steps, double dt) {
   since_ += steps;
   impulse_ += (steps * dt) * force_;
+}
+
+double Hand::work_until(const Backend& backend, double lag) const {
+  return pulls_ ? work_ + work_since_pull(mean(backend, lag)) : work_;
 }
 
 double Hand::let_go(Backend& backend, double lag) {

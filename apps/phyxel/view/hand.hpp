@@ -34,8 +34,8 @@ class Hand {
   /// Removes the forces. @returns the work done on the body since the patch was grabbed [J]
   double let_go(Backend& backend, double lag);
 
-  /// Work of the forces so far, up to the last pull [J].
-  double work() const { return work_; }
+  /// Work of the forces up to the present state [J].
+  double work_until(const Backend& backend, double lag) const;
   /// Their impulse so far [N s].
   Vec3d impulse() const { return impulse_; }
 

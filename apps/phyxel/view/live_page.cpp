@@ -10,10 +10,10 @@
 #include "base64.hpp"
 #include "drawn_obstacles.hpp"
 #include "phyxel/law_table.hpp"
+#include "report/opening_view.hpp"
 #include "report/page.hpp"
 #include "report/replay_obstacles.hpp"
 #include "rigid_paths.hpp"
-#include "report/opening_view.hpp"
 #include "version.hpp"
 
 namespace phyxel::app {
@@ -91,6 +91,9 @@ Json data_of(const LiveScene& live, const LivePicture& picture, const Instance& 
   data["carriers"] = Carriers::each;
   data["settings"] = settings_of(live.scene());
   data["step"] = live.solver().dt();
+  const Scene& scene = live.scene();
+  data["frame"] = scene.output.frames_per_second > 0 ? 1 / scene.output.frames_per_second
+                                                     : scene.time.end / 100;
   return data;
 }
 

@@ -137,6 +137,7 @@ const Diagnostics& LiveScene::look() {
     b.watch->check(now_, &*b.control);
   }
   acted_ = false;
+  if (hand_) held_work_ = hand_->work_until(*b.backend, b.solver->now().lag);
   return now_;
 }
 
@@ -144,6 +145,7 @@ void LiveScene::let_go() {
   if (!hand_) return;
   worked_ += hand_->let_go(backend(), solver().now().lag);
   pushed_ += hand_->impulse();
+  held_work_ = 0;
   hand_.reset();
 }
 
@@ -168,7 +170,7 @@ void LiveScene::apply(const Request& act) {
     case RequestKind::reset: {
       auto made = built(scene_);
       hand_.reset();
-      worked_ = 0;
+      worked_ = held_work_ = 0;
       pushed_ = {};
       const State state = initial_state(made->shared.here(), scene_, made->plan.dt);
       begin(std::move(made), state);
@@ -211,8 +213,17 @@ State LiveScene::carried_over(Built& next) const {
   if (next.plan.dt != state.dt) {
     state.looks = {};
     if (state.time > 0) {  // a step that divides the time so far, at most the planned one
+      // Within the first steps, that would be much less: there, the time moves by half a step at
+      // most.
+      constexpr double least_share = 0.95;
       state.step = static_cast<std::int64_t>(std::ceil(state.time / next.plan.dt));
-      next.plan.dt = state.time / static_cast<double>(state.step);
+      const double fitting = state.time / static_cast<double>(state.step);
+      if (fitting > least_share * next.plan.dt) {
+        next.plan.dt = fitting;
+      } else {
+        state.step = std::llround(state.time / next.plan.dt);
+        state.time = static_cast<double>(state.step) * next.plan.dt;
+      }
     }
     state.dt = next.plan.dt;
   }

@@ -50,8 +50,8 @@ class LiveScene {
   const Settings& settings() const { return settings_; }
   /// True while the hand holds a body.
   bool is_held() const { return hand_.has_value(); }
-  /// Work of the hand since the last reset, up to its last pull [J].
-  double hand_work() const { return worked_ + (hand_ ? hand_->work() : 0); }
+  /// Work of the hand since the last reset [J], up to the last look while it holds a body.
+  double hand_work() const { return worked_ + held_work_; }
   /// Impulse of the hand since the last reset [N s].
   Vec3d hand_impulse() const { return pushed_ + (hand_ ? hand_->impulse() : Vec3d{}); }
 
@@ -76,9 +76,10 @@ class LiveScene {
   std::unique_ptr<Built> built_;
   std::optional<Hand> hand_;
   std::int64_t taken_ = 0;
-  double worked_ = 0;   // by the hand, before it grabbed what it holds [J]
-  Vec3d pushed_;        // likewise [N s]
-  bool acted_ = false;  // since the last look, so that energies may have changed
+  double worked_ = 0;     // by the hand, before it grabbed what it holds [J]
+  double held_work_ = 0;  // since then, at the last look [J]
+  Vec3d pushed_;          // by the hand before [N s]
+  bool acted_ = false;    // since the last look, so that energies may have changed
   Diagnostics now_;
 };
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "phyxel/scene.hpp"
 #include "view/request.hpp"
 
 namespace phyxel::app {
@@ -17,13 +18,23 @@ struct Recorded {
   bool operator==(const Recorded&) const = default;
 };
 
+/// What a session is of: acts give the same bits where all of it is the same.
+struct RecordedRun {
+  std::uint64_t model = 0;            ///< Digest of the model at the start.
+  std::string precision, method;      ///< By name.
+  double dt = 0;                      ///< First step [s].
+  std::vector<Parameter> parameters;  ///< Of the scene (`scene_parameters`).
+};
+
 /// The acts of a session, in their order, and what they belong to.
 struct Recording {
-  std::string program;      ///< Version of the program.
-  std::uint64_t model = 0;  ///< Digest of the model at the start.
-  std::string precision;    ///< Of the arithmetic.
+  std::string program;  ///< Version of the program.
+  RecordedRun of;
   std::vector<Recorded> acts;
 };
+
+/// The differences between two runs in words, a line each; empty if there are none.
+std::string differences(const RecordedRun& then, const RecordedRun& now);
 
 /// A recording as lines of JSON: a head, and a line for each act.
 std::string text_of(const Recording& recording);

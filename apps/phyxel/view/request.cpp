@@ -85,6 +85,8 @@ class Keys {
   std::size_t read_ = 0;
 };
 
+/// Largest size of a request: deeper nesting would exhaust the stack.
+constexpr std::size_t most_bytes = 4096;
 /// The largest length [m] and acceleration [m/s²] of requests.
 constexpr double most_metres = 1e9, most_gravity = 1e5;
 
@@ -121,6 +123,9 @@ Json numbers(Vec3d v) { return Json{v.x, v.y, v.z}; }
 bool is_act(RequestKind kind) { return kind <= RequestKind::save; }
 
 Request parse_request(std::string_view text) {
+  if (text.size() > most_bytes) {
+    throw InputError(fmt::format("request: {} bytes; allowed: up to {}", text.size(), most_bytes));
+  }
   const Json object = Json::parse(text, nullptr, false);
   Request request;
   request.kind = kind_of(object);

@@ -29,10 +29,11 @@ using Text = std::shared_ptr<const std::string>;
 using Request = http::request<http::empty_body>;
 
 /// Limits of what others may send and leave unread.
-constexpr std::size_t most_connections = 64, most_bytes_of_message = 4096,
+constexpr std::size_t most_connections = 256, most_bytes_of_message = 4096,
                       most_unread_messages = 1000, most_queued_texts = 200;
 constexpr unsigned most_header_bytes = 16384;
-constexpr std::chrono::seconds patience{30};
+constexpr std::chrono::seconds patience{5};    // with a request
+constexpr std::chrono::minutes slow_line{10};  // for the page
 constexpr std::chrono::milliseconds farewell{100};
 /// Frames under way to a page.
 constexpr int most_frames_ahead = 2;
@@ -157,12 +158,13 @@ class ViewServer::Impl {
   /// True for a request that comes from the page of this server, or from outside any page.
   bool is_ours(const Request& request) const {
     const std::string_view host = view_of(request[http::field::host]);
-    if (local_) {
+    if (local_) {  // the port may be that of a tunnel
+      const std::string_view name = host.substr(0, host.find_last_not_of("0123456789") + 1);
       bool known = false;
-      for (const char* name : {"127.0.0.1", "localhost", "[::1]"}) {
-        known = known || host == fmt::format("{}:{}", name, port_);
+      for (const std::string& own :
+           {std::string("127.0.0.1"), std::string("localhost"), std::string("[::1]"), host_}) {
+        known = known || host == own || name == own + ":";
       }
-      known = known || host == fmt::format("{}:{}", host_, port_);
       if (!known) return false;
     }
     const auto origin = request.find(http::field::origin);
@@ -307,6 +309,7 @@ class ViewServer::Impl::Visit : public std::enable_shared_from_this<Visit> {
     response_.keep_alive(false);
     response_.body() = std::move(body);
     response_.prepare_payload();
+    stream_.expires_after(slow_line);
     http::async_write(stream_, response_,
                       [self = shared_from_this()](beast::error_code, std::size_t) {
                         beast::error_code ignored;
@@ -363,7 +366,11 @@ void ViewServer::Impl::receive(Page& from, std::string text) {
 void ViewServer::Impl::keep(std::string message) {
   {
     const std::lock_guard lock(mutex_);
-    if (messages_.size() < most_unread_messages) messages_.push_back(std::move(message));
+    const auto moves = [](const std::string& text) { return text.starts_with(R"({"do":"move")"); };
+    if (!messages_.empty() && moves(messages_.back()) && moves(message)) messages_.pop_back();
+    // A hand must let go, whatever waits.
+    const bool drops = message.find(R"("drop")") != std::string::npos;
+    if (messages_.size() < most_unread_messages || drops) messages_.push_back(std::move(message));
   }
   arrived_.notify_one();
 }

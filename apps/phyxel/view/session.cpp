@@ -23,7 +23,8 @@ namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 /// Time of a turn, after which requests are read again [s]; times between frames and between looks.
-constexpr double turn_seconds = 0.012, frame_seconds = 1.0 / 60, look_seconds = 0.1;
+constexpr double turn_seconds = 0.012, frame_seconds = 1.0 / 60, look_seconds = 0.1,
+                 most_look_pause = 2;
 /// Largest share of the time that looks at energies take, and that frames do.
 constexpr double look_share = 0.1, frame_share = 0.2;
 /// Largest size of a recorded session [bytes].
@@ -63,18 +64,21 @@ Session::Session(const ViewOptions& options)
       live_(ranks().agreed([&] { return scene_with(options.overrides); }), options.cut,
             options.overrides.unsafe_step),
       playing_(!options.paused),
-      pace_(options.pace) {
-  recording_ = {program_version(),
-                live_.shared().digest(),
-                precision_name(live_.scene().solver.precision),
-                {}};
+      pace_(options.pace),
+      until_(options.overrides.until) {
+  const Scene& scene = live_.scene();
+  if (fs::exists(scene.output.directory) && !fs::is_directory(scene.output.directory)) {
+    throw InputError(fmt::format("{}: no folder; allowed: a folder for what is saved",
+                                 scene.output.directory.string()));
+  }
+  recording_.program = program_version();
+  recording_.of = {live_.shared().digest(), precision_name(scene.solver.precision),
+                   method_name(scene.solver.method), live_.solver().dt(), scene_parameters(scene)};
   if (!options.replay.empty()) {
     const Recording read = recording_in(options);
-    if (read.model != recording_.model || read.precision != recording_.precision) {
+    if (const std::string others = differences(read.of, recording_.of); !others.empty()) {
       throw AgreedError(ExitCode::bad_input,
-                        fmt::format("{}: recorded with another model or precision ({}); allowed: "
-                                    "the scene of the session, in {}",
-                                    options.replay, read.precision, read.precision));
+                        fmt::format("{}: recorded in another run:\n{}", options.replay, others));
     }
     to_replay_.assign(read.acts.begin(), read.acts.end());
   }
@@ -98,6 +102,14 @@ void Session::run() {
     const Turn turn = agreed(all_ranks().leads() ? decided() : Turn());
     if (turn.end) break;
     take(turn);
+  }
+  // Only the first rank knows what is left.
+  const std::int64_t left = ranks().sum(
+      all_ranks().leads() ? static_cast<std::int64_t>(to_replay_.size()) : std::int64_t{0});
+  if (options_.headless && left > 0) {
+    throw AgreedError(ExitCode::stopped,
+                      fmt::format("stopped by a signal at t = {:g} s; {} acts are left",
+                                  live_.solver().time(), left));
   }
   if (server_) server_->send_text(R"({"message": "The program has ended."})");
 }
@@ -134,9 +146,17 @@ Session::Turn Session::decided() {
       tell_state();
     }
   }
+  if (until_ && live_.solver().time() >= *until_) {
+    until_.reset();
+    Request pause;
+    pause.kind = RequestKind::pause;
+    obey(pause);
+    tell(fmt::format("Paused at t = {:g} s (--until).", live_.solver().time()));
+  }
   add_acts(turn);
   const bool moves = options_.headless || (playing_ && !broken_ && server_->watchers() > 0);
-  turn.steps = moves ? steps_due() : std::exchange(asked_steps_, 0);
+  turn.steps = moves ? steps_due() : std::min(asked_steps_, steps_of_a_turn());
+  if (!moves) asked_steps_ -= turn.steps;
   if (broken_) turn.steps = 0;
   if (!to_replay_.empty()) {
     turn.steps = std::min(turn.steps, to_replay_.front().step - live_.taken());
@@ -212,19 +232,22 @@ void Session::add_acts(Turn& turn) {
   waiting_.clear();
 }
 
-std::int64_t Session::steps_due() {
+std::int64_t Session::steps_of_a_turn() const {
   constexpr double most = 1e6;
   const double room = seconds_per_step_ > 0 ? turn_seconds / seconds_per_step_ : 1;
-  if (options_.headless) {
-    return static_cast<std::int64_t>(std::clamp(room, 1.0, most));
-  }
+  return static_cast<std::int64_t>(std::clamp(room, 1.0, most));
+}
+
+std::int64_t Session::steps_due() {
+  if (options_.headless) return steps_of_a_turn();
+  const auto room = static_cast<double>(steps_of_a_turn());
   const double behind = pace_ * seconds_since(since_) - (live_.solver().time() - since_time_);
   const double due = behind / live_.solver().dt();
   if (due > room) {  // what the machine cannot do is not made up for later
     since_ = Clock::now();
-    since_time_ = live_.solver().time() + std::floor(room) * live_.solver().dt();
+    since_time_ = live_.solver().time() + room * live_.solver().dt();
   }
-  return static_cast<std::int64_t>(std::clamp(std::floor(due), 0.0, std::max(1.0, room)));
+  return static_cast<std::int64_t>(std::clamp(std::floor(due), 0.0, room));
 }
 
 void Session::take(const Turn& turn) {
@@ -249,7 +272,7 @@ void Session::take(const Turn& turn) {
     }
     if (server_) tell_energies();
     looked_at_ = live_.taken();
-    look_pause_ = std::max(look_seconds, seconds_since(start) / look_share);
+    look_pause_ = std::clamp(seconds_since(start) / look_share, look_seconds, most_look_pause);
     last_look_ = Clock::now();
   }
   if (turn.frame) {
@@ -278,6 +301,9 @@ void Session::act(const Request& request) {
   } catch (const DeviceError&) {
     throw;
   } catch (const Error& error) {  // on all ranks
+    if (options_.headless) {      // it was not refused when it was recorded
+      throw AgreedError(error.code(), fmt::format("{}: {}", options_.replay, error.what()));
+    }
     tell(error.what());
   }
   if (request.kind == RequestKind::reset || request.kind == RequestKind::set) {
@@ -332,10 +358,13 @@ void Session::save() {
     fmt::print("saved {} and session.jsonl beside it\n", checkpoint.string());
     std::fflush(stdout);
   }
+  const char* const use = live_.settings() == Settings{}
+                              ? "phyxel run SCENE --resume continues from it"
+                              : "a run continues from it if its scene is changed likewise";
   tell(
-      fmt::format("Saved: {} (phyxel run SCENE --resume continues from it), and session.jsonl "
-                  "beside it (phyxel view SCENE --replay shows it again).",
-                  checkpoint.string()));
+      fmt::format("Saved: {} ({}), and session.jsonl beside it (phyxel view SCENE --replay shows "
+                  "it again).",
+                  checkpoint.string(), use));
 }
 
 void Session::diverged(const std::string& why) {

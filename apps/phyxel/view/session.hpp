@@ -55,6 +55,7 @@ class Session {
   void read_messages();
   void obey(const Request& request);
   void add_acts(Turn& turn);
+  std::int64_t steps_of_a_turn() const;
   std::int64_t steps_due();
   void tell_state();
   void tell(const std::string& message);
@@ -76,6 +77,7 @@ class Session {
   std::vector<Request> waiting_;  // acts of the page
   bool playing_, broken_ = false;
   double pace_;
+  std::optional<double> until_;   // time at which it pauses [s]
   std::int64_t asked_steps_ = 0;  // by the page, while the scene rests
   std::int32_t field_ = -1;       // place of the shown field; -1: colours of bodies
   std::uint32_t frames_ = 0;

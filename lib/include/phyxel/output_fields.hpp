@@ -28,8 +28,8 @@ class OutputFields {
   /// proportion to their depth. Its principal stresses are those of the stress so found; so is von
   /// Mises', within the range of the phyxels' own. The values of "boundary" and "fragment" are
   /// those of the nearest phyxel. Velocities and histories are those of the state. The displacement
-  /// of a surfel is the way from its place at rest. A surfel beside a crack has the weighted mean of
-  /// the phyxels on its side. Collective on a share.
+  /// of a surfel is the way from its place at rest. A surfel beside a crack has the weighted mean
+  /// of the phyxels on its side. Collective on a share.
   /// @param state of the backend, with its history variables and the broken pairs of all ranks
   /// @param surfels the present surface, or null if it is not written
   /// @param recovery as of `find_fields`

@@ -307,12 +307,12 @@ function addSample(sample) {
 const sliders = {};
 function addSlider(name, label, {least, most, value, logarithmic = false, unit, wanted}) {
   const there = v => logarithmic ? Math.log(v) : v, back = v => logarithmic ? Math.exp(v) : v;
-  const input = element('input', {type: 'range', id: `set-${name}`, min: there(least), max: there(most), step: (there(most) - there(least)) / 200}), shownValue = element('span', {});
+  const input = element('input', {type: 'range', id: `set-${name}`, min: there(least), max: there(most), step: 'any'}), shownValue = element('span', {});
   const say = () => { shownValue.textContent = `${short(+back(Number(input.value)).toPrecision(3))}${unit}`; };
   input.value = there(value);
   say();
   input.addEventListener('input', say);
-  input.addEventListener('change', () => send({do: 'set', [name]: wanted(back(Number(input.value)))}));
+  input.addEventListener('change', () => { send({do: 'set', [name]: wanted(back(Number(input.value)))}); hand = null; });
   sliders[name] = {take: v => { input.value = there(Array.isArray(v) ? Math.hypot(...v) : v); say(); }};
   document.getElementById('settings').append(element('label', {class: 'slider'}, label, input, shownValue));
 }
@@ -333,8 +333,8 @@ function control() {
   const play = document.getElementById('play'), pace = document.getElementById('pace'), field = document.getElementById('field'), log = document.getElementById('log');
   const toggle = () => send({do: playing ? 'pause' : 'play'});
   play.addEventListener('click', toggle);
-  document.getElementById('step').addEventListener('click', () => send({do: 'step', count: Math.max(1, Math.round(Number(pace.value) / 60 / data.step))}));
-  document.getElementById('restart').addEventListener('click', () => send({do: 'reset'}));
+  document.getElementById('step').addEventListener('click', () => send({do: 'step', count: Math.max(1, Math.round(Math.min(Number(pace.value) / 60, data.frame) / data.step))}));
+  document.getElementById('restart').addEventListener('click', () => { send({do: 'reset'}); hand = null; });
   document.getElementById('save').addEventListener('click', () => send({do: 'save'}));
   for (const factor of [0.001, 0.01, 0.1, 0.25, 0.5, 1, 2, 5]) pace.append(element('option', {value: factor}, `${factor} × real time`));
   pace.value = 1;
