@@ -21,8 +21,8 @@ void say_fragments(const std::vector<FragmentReading>& fragments) {
   fmt::print("  fragments   {}, the heaviest with {:.3g}% of the mass; {}\n", totals.fragments,
              100 * totals.largest_share,
              totals.dust == 0 ? "no dust"
-                              : fmt::format("dust of {} phyxels, {:.3g}% of the mass", totals.dust,
-                                            100 * totals.dust_share));
+                              : fmt::format("dust of {} phyxel{}, {:.3g}% of the mass", totals.dust,
+                                            totals.dust == 1 ? "" : "s", 100 * totals.dust_share));
 }
 
 }  // namespace phyxel::app
