@@ -80,6 +80,14 @@ std::string script_json(const nlohmann::ordered_json& json) {
   return safe;
 }
 
+std::string with_separators(std::size_t number) {
+  std::string text = std::to_string(number);
+  for (auto at = static_cast<int>(text.size()) - 3; at > 0; at -= 3) {
+    text.insert(static_cast<std::size_t>(at), ",");
+  }
+  return text;
+}
+
 std::string html_warnings(std::span<const std::string> warnings) {
   std::string html;
   for (const std::string& warning : warnings) {

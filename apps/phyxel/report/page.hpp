@@ -21,6 +21,9 @@ std::string html_text(std::string_view text);
 /// JSON for a script element of a page.
 std::string script_json(const nlohmann::ordered_json& json);
 
+/// A number with commas between thousands.
+std::string with_separators(std::size_t number);
+
 /// A paragraph for each warning.
 std::string html_warnings(std::span<const std::string> warnings);
 /// A table of names and values.

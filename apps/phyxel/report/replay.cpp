@@ -51,15 +51,6 @@ std::string in_words(std::string name) {
   return name;
 }
 
-/// A number with commas between thousands.
-std::string with_separators(std::size_t number) {
-  std::string text = std::to_string(number);
-  for (auto at = static_cast<int>(text.size()) - 3; at > 0; at -= 3) {
-    text.insert(static_cast<std::size_t>(at), ",");
-  }
-  return text;
-}
-
 /// A trajectory on its way to a page.
 class Replay {
  public:

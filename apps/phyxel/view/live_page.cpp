@@ -128,8 +128,10 @@ std::string live_page(const LiveScene& live, const LivePicture& picture, const s
   }
   std::string title = live.scene().title;
   if (title.empty()) title = live.scene().file.stem().string();
-  const std::string summary = fmt::format("{} phyxels, {} surfels, {}", live.model().global_count(),
-                                          live.model().global_surfel_count(), about);
+  const std::string summary = fmt::format(
+      "{} phyxels, {} surfels, {}",
+      with_separators(static_cast<std::size_t>(live.model().global_count())),
+      with_separators(static_cast<std::size_t>(live.model().global_surfel_count())), about);
   return filled_page("view.html",
                      {{"title", html_text(title)},
                       {"summary", html_text(summary)},
