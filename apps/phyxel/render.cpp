@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "command.hpp"
@@ -46,6 +47,13 @@ void video_command(const RenderOptions& options, const PictureRequest& request) 
 void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
   request.camera.view = vector_of(options.view, "--view");
+  const CameraOptions& camera = options.request.camera;  // ranges of options let NaN pass
+  for (const auto& [name, angle] : {std::pair{"--orbit", camera.orbit},
+                                    std::pair{"--field-of-view", camera.field_of_view}}) {
+    if (angle && !std::isfinite(*angle)) {
+      throw InputError(fmt::format("{} {}: allowed: a finite angle in degrees", name, *angle));
+    }
+  }
   request.camera.up = vector_of(options.up, "--up");
   request.camera.position = vector_of(options.position, "--position");
   request.camera.target = vector_of(options.target, "--target");

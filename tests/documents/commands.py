@@ -21,7 +21,7 @@ FFMPEG = shutil.which("ffmpeg") is not None
 failures = []
 
 # What takes minutes, wants a GPU, or needs what only a finished measurement leaves.
-LONG = re.compile(r"\bphyxel (paper|bench|accuracy)\b|phyxel_studies|cluster|twist|large_body|-n [3-9]|cuda|big|ten_dinos|--until 0\.5|"
+LONG = re.compile(r"\bphyxel (paper|bench|accuracy|view)\b|phyxel_studies|cluster|twist|large_body|-n [3-9]|cuda|big|ten_dinos|--until 0\.5|"
                   r"--render|horn_bug|alien_head|2000000|scan.ply|gear.stl")
 
 

@@ -49,6 +49,7 @@ struct FragmentTotals {
   Index dust = 0;            ///< Number of phyxels that are dust.
   double dust_share = 0;     ///< Mass of the dust over that of all bodies.
 };
+/// Sums the fragments of a scene up.
 FragmentTotals totals_of(std::span<const FragmentReading> readings);
 
 /// A number of a fragment: a column of `fragments.csv`.
