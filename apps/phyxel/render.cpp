@@ -48,8 +48,8 @@ void render_command(const RenderOptions& options) {
   PictureRequest request = options.request;
   request.camera.view = vector_of(options.view, "--view");
   const CameraOptions& camera = options.request.camera;  // ranges of options let NaN pass
-  for (const auto& [name, angle] : {std::pair{"--orbit", camera.orbit},
-                                    std::pair{"--field-of-view", camera.field_of_view}}) {
+  for (const auto& [name, angle] :
+       {std::pair{"--orbit", camera.orbit}, std::pair{"--field-of-view", camera.field_of_view}}) {
     if (angle && !std::isfinite(*angle)) {
       throw InputError(fmt::format("{} {}: allowed: a finite angle in degrees", name, *angle));
     }
