@@ -58,10 +58,12 @@ Json settings_of(const Scene& scene) {
   });
   if (elastic) settings["stiffness"] = 1;
   settings["damping"] = scene.bodies.empty() ? 0 : scene.bodies.front().material.damping;
-  if (scene.contact) {
-    settings["friction"] = scene.contact->friction;
-  } else if (!scene.obstacles.empty()) {
-    settings["friction"] = scene.obstacles.front().friction;
+  if (scene.contact || !scene.obstacles.empty()) {
+    double friction = scene.contact ? scene.contact->friction : 0;
+    for (const ObstacleRequest& obstacle : scene.obstacles) {
+      friction = std::max(friction, obstacle.friction);
+    }
+    settings["friction"] = friction;
   }
   return settings;
 }
