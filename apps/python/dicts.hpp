@@ -26,41 +26,43 @@ inline py::dict energies_of(const Diagnostics& now) {
   return values;
 }
 
+/// Returns a list with a dict for each reading, which `fill(reading, dict)` fills.
+template <class Reading, class Fill>
+py::list listed(const std::vector<Reading>& readings, Fill&& fill) {
+  py::list list;
+  for (const Reading& reading : readings) {
+    py::dict values;
+    fill(reading, values);
+    list.append(values);
+  }
+  return list;
+}
+
 /// Returns a dict of each reaction.
 inline py::list dicts_of(const std::vector<Reaction>& reactions) {
-  py::list list;
-  for (const Reaction& reaction : reactions) {
-    py::dict values;
+  return listed(reactions, [](const Reaction& reaction, py::dict& values) {
     values["body"] = reaction.body;
     values["set"] = reaction.set;
     values["force"] = reaction.force;
     values["torque"] = reaction.torque;
     values["centre"] = reaction.centre;
     values["work"] = reaction.work;
-    list.append(values);
-  }
-  return list;
+  });
 }
 
 /// Returns a dict of each gas.
 inline py::list dicts_of(const std::vector<GasReading>& gases) {
-  py::list list;
-  for (const GasReading& gas : gases) {
-    py::dict values;
+  return listed(gases, [](const GasReading& gas, py::dict& values) {
     values["body"] = gas.body;
     values["set"] = gas.set;
     values["pressure"] = gas.pressure;
     values["volume"] = gas.volume;
-    list.append(values);
-  }
-  return list;
+  });
 }
 
 /// Returns a dict of each obstacle.
 inline py::list dicts_of(const std::vector<ContactReading>& contacts) {
-  py::list list;
-  for (const ContactReading& contact : contacts) {
-    py::dict values;
+  return listed(contacts, [](const ContactReading& contact, py::dict& values) {
     values["obstacle"] = contact.obstacle;
     values["force"] = contact.force;
     values["torque"] = contact.torque;
@@ -71,32 +73,24 @@ inline py::list dicts_of(const std::vector<ContactReading>& contacts) {
     values["impact_loss"] = contact.impact_loss;
     values["depth"] = contact.depth;
     values["place"] = contact.place;
-    list.append(values);
-  }
-  return list;
+  });
 }
 
 /// Returns a dict of each free rigid body.
 inline py::list dicts_of(const std::vector<RigidReading>& bodies) {
-  py::list list;
-  for (const RigidReading& body : bodies) {
-    py::dict values;
+  return listed(bodies, [](const RigidReading& body, py::dict& values) {
     values["obstacle"] = body.obstacle;
     values["place"] = body.place;
     values["rotation"] = body.rotation;
     values["velocity"] = body.velocity;
     values["spin"] = body.spin;
     values["kinetic_energy"] = body.kinetic_energy;
-    list.append(values);
-  }
-  return list;
+  });
 }
 
 /// Returns a dict of each fragment.
 inline py::list dicts_of(const std::vector<FragmentReading>& fragments) {
-  py::list list;
-  for (const FragmentReading& fragment : fragments) {
-    py::dict values;
+  return listed(fragments, [](const FragmentReading& fragment, py::dict& values) {
     values["body"] = fragment.body;
     values["fragment"] = fragment.number;
     values["first_phyxel"] = fragment.first;
@@ -106,9 +100,7 @@ inline py::list dicts_of(const std::vector<FragmentReading>& fragments) {
     values["velocity"] = fragment.velocity;
     values["angular_momentum"] = fragment.angular_momentum;
     values["spin"] = fragment.spin;
-    list.append(values);
-  }
-  return list;
+  });
 }
 
 /// Returns the values of readings, one row each, by their names.

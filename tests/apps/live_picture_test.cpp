@@ -1,4 +1,4 @@
-/// What a live page is sent, and what it makes of it.
+/// The data of a live page, and the surface that its shaders make of them.
 #include "view/live_picture.hpp"
 
 #include <gtest/gtest.h>

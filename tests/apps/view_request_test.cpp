@@ -34,6 +34,19 @@ TEST(Requests, AreWhatTheirTextsSay) {
   EXPECT_EQ(parse_request(R"({"do": "pace", "factor": 0.25})").number, 0.25);
 }
 
+TEST(Settings, TakeTheValuesOfLaterOnes) {
+  const Settings whole{
+      .gravity = Vec3d{0, 0, 1}, .stiffness = 2.0, .damping = 3.0, .friction = 4.0};
+  Settings taken;
+  taken.take(whole);
+  EXPECT_EQ(taken, whole);
+  taken.take({});
+  EXPECT_EQ(taken, whole);
+  taken.take({.friction = 0.5});
+  EXPECT_EQ(taken.friction, 0.5);
+  EXPECT_EQ(taken.damping, 3.0);
+}
+
 TEST(Requests, KeepTheirBitsAsText) {
   for (const char* text :
        {R"({"do":"move","by":[0.1,-1e-300,0.3333333333333333]})", R"({"do":"grab","phyxel":12})",

@@ -53,6 +53,12 @@ Json opening_view(const CameraWishes& wishes, const std::vector<Instance>& insta
   for (const Vec3d p : outermost.points()) {
     page["outermost"].push_back(numbers(scaled(p - extent.centre())));
   }
+  page["centre"] = numbers(extent.centre());
+  page["radius"] = extent.radius;
+  for (const Span& side : extent.box) {
+    page["scale"].push_back(side.width() / Span::steps / extent.radius);
+    page["low"].push_back(-side.width() / 2 / extent.radius);
+  }
   for (const Vec3d w : way) page["follow"].push_back(numbers(scaled(w)));
   return page;
 }

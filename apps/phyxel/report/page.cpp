@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "base64.hpp"
 #include "embedded_files.hpp"
 #include "outside_text.hpp"
 
@@ -78,6 +79,11 @@ std::string script_json(const nlohmann::ordered_json& json) {
     }
   }
   return safe;
+}
+
+std::string byte_element(std::string_view name, std::span<const std::byte> bytes) {
+  return fmt::format("<script type=\"application/octet-stream\" id=\"{}\">{}</script>\n", name,
+                     base64(bytes));
 }
 
 std::string with_separators(std::size_t number) {

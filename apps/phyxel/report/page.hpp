@@ -21,6 +21,9 @@ std::string html_text(std::string_view text);
 /// JSON for a script element of a page.
 std::string script_json(const nlohmann::ordered_json& json);
 
+/// An element of a page that holds an array of bytes, which its script finds by name.
+std::string byte_element(std::string_view name, std::span<const std::byte> bytes);
+
 /// A number with commas between thousands.
 std::string with_separators(std::size_t number);
 

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "base64.hpp"
 #include "compose.hpp"
 #include "phyxel/error.hpp"
 #include "report/opening_view.hpp"
@@ -339,8 +338,7 @@ class Replay {
                        double spacing) const {
     std::string elements;
     const auto embed = [&](const std::string& name, const auto& numbers) {
-      elements += fmt::format("<script type=\"application/octet-stream\" id=\"{}\">{}</script>\n",
-                              name, base64(std::as_bytes(std::span(numbers))));
+      elements += byte_element(name, std::as_bytes(std::span(numbers)));
     };
     for (std::size_t k = 0; k < instances.size(); ++k) {
       embed(fmt::format("frame{}", k), quantised(instances[k], extent));
@@ -362,21 +360,15 @@ class Replay {
       embed("carriers", carriers.phyxel);
       embed("weights", carriers.weight);
     }
-    for (std::size_t k = 0; k < obstacles_.size(); ++k) {
-      if (!obstacles_[k].surface) continue;
-      embed(fmt::format("obstacle{}", k), scaled_vertices(*obstacles_[k].surface, extent));
-      embed(fmt::format("obstacle{}-triangles", k), obstacles_[k].surface->triangle);
-    }
+    elements += obstacle_elements(obstacles_, extent);
     return elements;
   }
 
   /// The data that the page's script reads. Lengths are in units of the radius, about the centre.
   Json data_of(const std::vector<Instance>& instances, const Extent& extent, double spacing) const {
-    const auto& [box, ranges, radius] = extent;
+    const std::vector<Span>& ranges = extent.ranges;
+    const double radius = extent.radius;
     Json data = opening_view(camera_, instances, extent, way_);
-    const Vec3d centre = extent.centre();
-    data["centre"] = {centre.x, centre.y, centre.z};
-    data["radius"] = radius;
     data["surfels"] = instances.front().surfels.size();
     data["phyxels"] = instances.front().phyxels.size();
     data["decimals"] = time_decimals(trajectory_.shots);
@@ -398,15 +390,12 @@ class Replay {
     }
     const Opening opening = opening_of(instances, field_names_, opening_ranges);
     data["opening"] = {{"frame", opening.frame}, {"field", opening.field}};
-    for (const Span& side : box) {
-      data["scale"].push_back(side.width() / Span::steps / radius);
-      data["low"].push_back(-side.width() / 2 / radius);
-    }
     std::vector<double> times;
     for (const Instance& instance : instances) times.push_back(instance.time);
     const bool floor = obstacles_.empty() && looks_down(camera_.view, camera_.up);
-    data["obstacles"] = obstacles_json(
-        floor ? std::vector{floor_of(instances, extent)} : obstacles_, paths_, times, extent);
+    data["obstacles"] =
+        obstacles_json(floor ? std::vector{floor_under(instances, extent, camera_.up)} : obstacles_,
+                       paths_, times, extent);
     data["only_floor"] = floor;
     if (!uncut_.empty()) data["uncut"] = uncut_;
     data["spacing"] = spacing / radius;
@@ -415,17 +404,6 @@ class Replay {
     data["log"] = run_.log();
     data["timing"] = run_.timing();
     return data;
-  }
-
-  /// A floor below all points of a scene without obstacles.
-  Obstacle floor_of(const std::vector<Instance>& instances, const Extent& extent) const {
-    Span height;
-    for (const Instance& instance : instances) {
-      for (const auto* points : {&instance.surfels, &instance.phyxels}) {
-        for (const Vec3d& p : *points) height.include(dot(p, normalised(camera_.up)));
-      }
-    }
-    return floor_below(camera_.up, extent.centre(), height.low, 2 * extent.radius);
   }
 
   std::string summary_line(double end) const {

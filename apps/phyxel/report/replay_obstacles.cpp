@@ -1,6 +1,9 @@
 #include "report/replay_obstacles.hpp"
 
+#include <fmt/format.h>
+
 #include "phyxel/physics/obstacles.hpp"
+#include "report/page.hpp"
 
 namespace phyxel::app {
 namespace {
@@ -50,6 +53,9 @@ double embedded_size(const std::vector<Obstacle>& obstacles) {
   return bytes;
 }
 
+namespace {
+
+/// The vertices of an obstacle's mesh in its own coordinates, in units of the radius of `extent`.
 std::vector<float> scaled_vertices(const Surface& surface, const Extent& extent) {
   std::vector<float> numbers;
   for (const Vec3d x : surface.position) {
@@ -58,6 +64,32 @@ std::vector<float> scaled_vertices(const Surface& surface, const Extent& extent)
     }
   }
   return numbers;
+}
+
+}  // namespace
+
+std::string obstacle_elements(const std::vector<Obstacle>& obstacles, const Extent& extent) {
+  std::string elements;
+  for (std::size_t k = 0; k < obstacles.size(); ++k) {
+    if (!obstacles[k].surface) continue;
+    const Surface& surface = *obstacles[k].surface;
+    const std::vector<float> vertices = scaled_vertices(surface, extent);
+    elements += byte_element(fmt::format("obstacle{}", k), std::as_bytes(std::span(vertices)));
+    elements += byte_element(fmt::format("obstacle{}-triangles", k),
+                             std::as_bytes(std::span(surface.triangle)));
+  }
+  return elements;
+}
+
+Obstacle floor_under(const std::vector<Instance>& instances, const Extent& extent, Vec3d up,
+                     double gap) {
+  Span height;
+  for (const Instance& instance : instances) {
+    for (const auto* points : {&instance.surfels, &instance.phyxels}) {
+      for (const Vec3d& p : *points) height.include(dot(p, normalised(up)));
+    }
+  }
+  return floor_below(up, extent.centre(), height.low - gap, 2 * extent.radius);
 }
 
 }  // namespace phyxel::app

@@ -24,7 +24,12 @@ nlohmann::ordered_json obstacles_json(const std::vector<Obstacle>& obstacles,
 /// Size of the elements with surfaces of obstacles [bytes].
 double embedded_size(const std::vector<Obstacle>& obstacles);
 
-/// The vertices of an obstacle's mesh in its own coordinates, in units of the radius of `extent`.
-std::vector<float> scaled_vertices(const Surface& surface, const Extent& extent);
+/// The elements of a page that hold the surfaces of obstacles from meshes.
+std::string obstacle_elements(const std::vector<Obstacle>& obstacles, const Extent& extent);
+
+/// A floor below all points of a scene without obstacles.
+/// @param gap distance to the lowest point [m]
+Obstacle floor_under(const std::vector<Instance>& instances, const Extent& extent, Vec3d up,
+                     double gap = 0);
 
 }  // namespace phyxel::app

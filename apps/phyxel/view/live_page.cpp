@@ -7,7 +7,6 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
-#include "base64.hpp"
 #include "drawn_obstacles.hpp"
 #include "phyxel/law_table.hpp"
 #include "report/opening_view.hpp"
@@ -42,11 +41,8 @@ std::vector<Obstacle> drawn(const LiveScene& live, const Instance& rest, const E
   const CameraWishes look = wishes_of(live.scene());
   floor = live.model().obstacles.empty() && looks_down(look.view, look.up);
   if (!floor) return live.model().obstacles;
-  Span height;
-  for (const auto* points : {&rest.surfels, &rest.phyxels}) {
-    for (const Vec3d& p : *points) height.include(dot(p, normalised(look.up)));
-  }
-  return {floor_below(look.up, extent.centre(), height.low - extent.radius / 2, 2 * extent.radius)};
+  // The bodies have room to fall a little.
+  return {floor_under({rest}, extent, look.up, extent.radius / 2)};
 }
 
 /// The sliders that the scene has a use for, with their values.
@@ -79,13 +75,6 @@ Json data_of(const LiveScene& live, const LivePicture& picture, const Instance& 
     data["fields"].push_back({{"name", field.name}, {"unit", field.unit}});
   }
   data["opening"] = {{"frame", 0}, {"field", -1}};
-  data["radius"] = extent.radius;
-  const Vec3d centre = extent.centre();
-  data["centre"] = {centre.x, centre.y, centre.z};
-  for (const Span& side : extent.box) {
-    data["scale"].push_back(side.width() / Span::steps / extent.radius);
-    data["low"].push_back(-side.width() / 2 / extent.radius);
-  }
   const double start[] = {0};
   data["obstacles"] = obstacles_json(obstacles, RigidPaths(), start, extent);
   data["only_floor"] = floor;
@@ -110,8 +99,7 @@ std::string live_page(const LiveScene& live, const LivePicture& picture, const s
   const std::vector<Obstacle> obstacles = drawn(live, rest, extent, floor);
   std::string elements;
   const auto embed = [&](const std::string& name, const auto& numbers) {
-    elements += fmt::format("<script type=\"application/octet-stream\" id=\"{}\">{}</script>\n",
-                            name, base64(std::as_bytes(std::span(numbers))));
+    elements += byte_element(name, std::as_bytes(std::span(numbers)));
   };
   embed("rest-phyxels", scaled(rest.phyxels, extent));
   embed("phyxels-bodies", picture.phyxel_bodies());
@@ -123,11 +111,7 @@ std::string live_page(const LiveScene& live, const LivePicture& picture, const s
     embed("carriers", picture.carriers().phyxel);
     embed("weights", picture.carriers().weight);
   }
-  for (std::size_t k = 0; k < obstacles.size(); ++k) {
-    if (!obstacles[k].surface) continue;
-    embed(fmt::format("obstacle{}", k), scaled_vertices(*obstacles[k].surface, extent));
-    embed(fmt::format("obstacle{}-triangles", k), obstacles[k].surface->triangle);
-  }
+  elements += obstacle_elements(obstacles, extent);
   std::string title = live.scene().title;
   if (title.empty()) title = live.scene().file.stem().string();
   const std::string summary = fmt::format(

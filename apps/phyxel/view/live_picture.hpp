@@ -1,4 +1,4 @@
-/// What a live page is sent: the bodies at rest once, and their motion frame by frame.
+/// The data of a live page: the bodies at rest once, and their motion frame by frame.
 #pragma once
 
 #include <cstdint>
@@ -66,7 +66,7 @@ class LivePicture {
   std::vector<std::size_t> place_;  // of the phyxels that all ranks send, one rank after the other
 };
 
-/// What is before the numbers of a frame.
+/// The head of a frame, before its numbers.
 struct FrameHead {
   std::uint32_t kind = 1;     ///< Of the message.
   std::uint32_t number = 0;   ///< Of the frame.

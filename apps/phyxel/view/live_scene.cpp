@@ -61,7 +61,7 @@ Scene with_settings(Scene scene, const Settings& settings) {
   return scene;
 }
 
-/// What is made anew where a setting changes.
+/// The model with its backend and solver, which a change of settings makes anew.
 struct LiveScene::Built {
   Built(const Scene& scene, const ChosenDevice& device, const CutOptions& cut, bool unsafe_step)
       : shared(all_ranks(), scene, device, cut),
@@ -233,10 +233,7 @@ State LiveScene::carried_over(Built& next) const {
 
 void LiveScene::set(const Settings& settings) {
   Settings all = settings_;
-  if (settings.gravity) all.gravity = settings.gravity;
-  if (settings.stiffness) all.stiffness = settings.stiffness;
-  if (settings.damping) all.damping = settings.damping;
-  if (settings.friction) all.friction = settings.friction;
+  all.take(settings);
   Scene changed = with_settings(given_, all);
   auto made = built(changed);  // throws before anything has changed
   check_cut(model(), made->shared.here());

@@ -44,7 +44,7 @@ class LiveScene {
   const Solver& solver() const;
   /// The result of the last look.
   const Diagnostics& now() const { return now_; }
-  /// Steps taken since the start, whatever became of their number by resets and changes of size.
+  /// Number of steps since the start, which resets and changes of the step's size do not change.
   std::int64_t taken() const { return taken_; }
   /// The values that acts have set.
   const Settings& settings() const { return settings_; }

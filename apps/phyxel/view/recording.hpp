@@ -1,4 +1,4 @@
-/// What users have done to a live scene, on disk.
+/// Acts of users on a live scene, as files.
 #pragma once
 
 #include <cstdint>
@@ -18,7 +18,7 @@ struct Recorded {
   bool operator==(const Recorded&) const = default;
 };
 
-/// What a session is of: acts give the same bits where all of it is the same.
+/// The run that a session belongs to. In an equal run, the same acts give the same bits.
 struct RecordedRun {
   std::uint64_t model = 0;            ///< Digest of the model at the start.
   std::string precision, method;      ///< By name.
@@ -26,7 +26,7 @@ struct RecordedRun {
   std::vector<Parameter> parameters;  ///< Of the scene (`scene_parameters`).
 };
 
-/// The acts of a session, in their order, and what they belong to.
+/// The acts of a session, in their order, and its run.
 struct Recording {
   std::string program;  ///< Version of the program.
   RecordedRun of;

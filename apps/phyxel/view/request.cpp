@@ -120,6 +120,13 @@ Json numbers(Vec3d v) { return Json{v.x, v.y, v.z}; }
 
 }  // namespace
 
+void Settings::take(const Settings& later) {
+  if (later.gravity) gravity = later.gravity;
+  if (later.stiffness) stiffness = later.stiffness;
+  if (later.damping) damping = later.damping;
+  if (later.friction) friction = later.friction;
+}
+
 bool is_act(RequestKind kind) { return kind <= RequestKind::save; }
 
 Request parse_request(std::string_view text) {

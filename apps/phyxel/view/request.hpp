@@ -1,4 +1,4 @@
-/// What a page, or a recorded session, asks of a live scene.
+/// Requests of a page, or of a recorded session, to a live scene.
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
@@ -16,6 +16,8 @@ struct Settings {
   std::optional<double> stiffness;  ///< Young's moduli over those of the scene.
   std::optional<double> damping;    ///< Mass-proportional damping of all bodies [1/s].
   std::optional<double> friction;   ///< Coulomb's coefficient of all contacts.
+  /// Takes the values that `later` has set.
+  void take(const Settings& later);
   bool operator==(const Settings&) const = default;
 };
 

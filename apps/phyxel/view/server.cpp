@@ -9,7 +9,6 @@
 #include <mutex>
 #include <optional>
 #include <random>
-#include <set>
 #include <string_view>
 #include <thread>
 #include <utility>
@@ -28,7 +27,7 @@ using tcp = asio::ip::tcp;
 using Text = std::shared_ptr<const std::string>;
 using Request = http::request<http::empty_body>;
 
-/// Limits of what others may send and leave unread.
+/// Limits on the traffic of clients.
 constexpr std::size_t most_connections = 256, most_bytes_of_message = 4096,
                       most_unread_messages = 1000, most_queued_texts = 200;
 constexpr unsigned most_header_bytes = 16384;
@@ -58,8 +57,8 @@ bool equal_texts(std::string_view a, std::string_view b) {
 
 std::string_view view_of(beast::string_view text) { return {text.data(), text.size()}; }
 
-/// True for the message of a page that it has drawn a frame, {"do": "seen"}. All others are for the
-/// scene.
+/// True for the message by which a page says that it has drawn a frame, {"do": "seen"}. Other
+/// messages are requests to the scene.
 bool is_seen(std::string_view text) { return text == R"({"do":"seen"})"; }
 
 }  // namespace
@@ -114,7 +113,7 @@ class ViewServer::Impl {
 
   class Page;
 
-  /// What is sent to a page. Frames that it has no time for are skipped.
+  /// A message to a page, which skips frames that it has no time for.
   struct Outgoing {
     Text text;
     bool frame = false;
@@ -258,7 +257,7 @@ class ViewServer::Impl::Page : public std::enable_shared_from_this<Page> {
   bool ended_ = false;
 };
 
-/// A connection before it is known what it asks for.
+/// A connection whose request is still unknown.
 class ViewServer::Impl::Visit : public std::enable_shared_from_this<Visit> {
  public:
   Visit(Impl& server, tcp::socket socket) : server_(server), stream_(std::move(socket)) {

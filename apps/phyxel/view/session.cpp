@@ -40,14 +40,7 @@ Recording recording_in(const ViewOptions& options) {
 /// Sets that follow each other become one, since each of them makes the model anew.
 void add_merged(std::vector<Request>& acts, const Request& act) {
   if (act.kind == RequestKind::set && !acts.empty() && acts.back().kind == RequestKind::set) {
-    Settings& all = acts.back().settings;
-    const auto take = [](auto& to, const auto& from) {
-      if (from) to = from;
-    };
-    take(all.gravity, act.settings.gravity);
-    take(all.stiffness, act.settings.stiffness);
-    take(all.damping, act.settings.damping);
-    take(all.friction, act.settings.friction);
+    acts.back().settings.take(act.settings);
   } else if (act.kind == RequestKind::move && !acts.empty() &&
              acts.back().kind == RequestKind::move) {
     acts.back() = act;
@@ -196,8 +189,7 @@ void Session::obey(const Request& request) {
     case RequestKind::play:
     case RequestKind::pause:
       playing_ = request.kind == RequestKind::play;
-      since_ = Clock::now();
-      since_time_ = live_.solver().time();
+      restart_clock();
       break;
     case RequestKind::step:
       playing_ = false;
@@ -205,8 +197,7 @@ void Session::obey(const Request& request) {
       break;
     case RequestKind::pace:
       pace_ = request.number;
-      since_ = Clock::now();
-      since_time_ = live_.solver().time();
+      restart_clock();
       break;
     default: {
       const std::vector<LiveField>& fields = picture_->fields();
@@ -230,6 +221,11 @@ void Session::add_acts(Turn& turn) {
   }
   turn.acts.insert(turn.acts.end(), waiting_.begin(), waiting_.end());
   waiting_.clear();
+}
+
+void Session::restart_clock() {
+  since_ = Clock::now();
+  since_time_ = live_.solver().time();
 }
 
 std::int64_t Session::steps_of_a_turn() const {
@@ -308,8 +304,8 @@ void Session::act(const Request& request) {
   }
   if (request.kind == RequestKind::reset || request.kind == RequestKind::set) {
     broken_ = false;
-    since_ = Clock::now();
-    since_time_ = speed_time_ = live_.solver().time();
+    restart_clock();
+    speed_time_ = live_.solver().time();
     looked_at_ = -1;
     seconds_per_step_ = 0;
     tell_state();

@@ -32,7 +32,7 @@ struct ViewOptions {
 };
 
 /// A live view from its set-up to its end. All ranks step; the first one serves the page, decides
-/// what comes next and tells the others.
+/// on the next turn, which it sends to all.
 class Session {
  public:
   explicit Session(const ViewOptions& options);
@@ -40,7 +40,7 @@ class Session {
   void run();
 
  private:
-  /// What all ranks do next.
+  /// The next actions of all ranks.
   struct Turn {
     std::vector<Request> acts;
     std::int64_t steps = 0;
@@ -55,6 +55,8 @@ class Session {
   void read_messages();
   void obey(const Request& request);
   void add_acts(Turn& turn);
+  /// Counts the pace from now.
+  void restart_clock();
   std::int64_t steps_of_a_turn() const;
   std::int64_t steps_due();
   void tell_state();

@@ -205,22 +205,14 @@ function control() {
   for (const factor of [0.1, 0.25, 0.5, 1, 2, 5]) speed.append(element('option', {value: factor}, `${factor} × real time`));
   if (length > 0) speed.append(element('option', {value: whole}, 'in 10 s'));
   speed.value = length > 0 && (length < 1 || length > 30) ? whole : 1;
+  controlShown();
   const field = document.getElementById('field');
-  field.append(element('option', {value: -1}, 'bodies'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
-  field.value = shown.field;
   field.addEventListener('change', () => { choose(Number(field.value)); draw(); });
   const log = document.getElementById('log');
   log.addEventListener('change', () => { shown.log = log.checked; draw(); });
   choose(shown.field);
   const range = document.getElementById('range');
   range.addEventListener('change', () => { shown.range = range.value; draw(); });
-  for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels], ['obstacles', obstacles.length]]) {
-    const box = document.getElementById(name);
-    box.checked = shown[name]; box.disabled = !count;
-    box.addEventListener('change', () => { shown[name] = box.checked; draw(); });
-  }
-  document.getElementById('with-obstacles').hidden = !obstacles.length;
-  if (data.only_floor) document.querySelector('#with-obstacles span').textContent = 'floor';
   controlCut();
   watchPointers();
   document.addEventListener('keydown', event => {

@@ -247,6 +247,21 @@ function draw() {
   drawAxes(rows);
 }
 
+// --- controls of both pages ----------------------------------------------------------------------
+/// Fills the list of fields, and lets boxes choose what is drawn.
+function controlShown() {
+  const field = document.getElementById('field');
+  field.append(element('option', {value: -1}, 'bodies'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
+  field.value = shown.field;
+  for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels], ['obstacles', obstacles.length]]) {
+    const box = document.getElementById(name);
+    box.checked = shown[name]; box.disabled = !count;
+    box.addEventListener('change', () => { shown[name] = box.checked; draw(); });
+  }
+  document.getElementById('with-obstacles').hidden = !obstacles.length;
+  if (data.only_floor) document.querySelector('#with-obstacles span').textContent = 'floor';
+}
+
 // --- pointers ------------------------------------------------------------------------------------
 /// Lets pointers turn, shift and enlarge what is seen, unless the page takes them (`source.takes`).
 function watchPointers() {

@@ -338,18 +338,10 @@ function control() {
   document.getElementById('save').addEventListener('click', () => send({do: 'save'}));
   for (const factor of [0.001, 0.01, 0.1, 0.25, 0.5, 1, 2, 5]) pace.append(element('option', {value: factor}, `${factor} × real time`));
   pace.value = 1;
+  controlShown();
   pace.addEventListener('change', () => send({do: 'pace', factor: Number(pace.value)}));
-  field.append(element('option', {value: -1}, 'bodies'), ...data.fields.map((f, k) => element('option', {value: k}, f.name)));
-  field.value = shown.field;
   field.addEventListener('change', () => { shown.field = Number(field.value); send({do: 'show', field: shown.field < 0 ? 'bodies' : data.fields[shown.field].name}); draw(); });
   log.addEventListener('change', () => { shown.log = log.checked; draw(); });
-  for (const [name, count] of [['surface', data.surfels], ['phyxels', data.phyxels], ['obstacles', obstacles.length]]) {
-    const box = document.getElementById(name);
-    box.checked = shown[name]; box.disabled = !count;
-    box.addEventListener('change', () => { shown[name] = box.checked; draw(); });
-  }
-  document.getElementById('with-obstacles').hidden = !obstacles.length;
-  if (data.only_floor) document.querySelector('#with-obstacles span').textContent = 'floor';
   canvas.addEventListener('pointerdown', grab);
   for (const end of ['pointerup', 'pointercancel']) canvas.addEventListener(end, drop);
   document.addEventListener('keydown', event => {
