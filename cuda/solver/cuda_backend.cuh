@@ -7,6 +7,7 @@
 #include <string>
 
 #include "solver/body_contacts.cuh"
+#include "solver/chosen_motions.cuh"
 #include "solver/cuda_backend.hpp"
 #include "solver/kept_motion.cuh"
 #include "solver/launch_path.cuh"
@@ -245,6 +246,11 @@ class CudaBackend final : public Backend {
             values[static_cast<std::size_t>(e) * m_.places() + m_.tiling().place[i]];
       }
     }
+  }
+
+  std::vector<PhyxelMotion> motions_of(std::span<const Index> phyxels) override {
+    m_.use_device();
+    return chosen_motions(m_, passes_->gradients(), phyxels);
   }
 
   void fit_residuals(std::vector<double>& residual) override {

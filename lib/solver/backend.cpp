@@ -20,6 +20,19 @@ void Backend::fit_residuals(std::vector<double>&) {
   throw InputError(name() + ": no hourglass control here; allowed is hourglass = 0");
 }
 
+std::vector<PhyxelMotion> Backend::motions_of(std::span<const Index> phyxels) {
+  State state;
+  download(state);
+  std::vector<Mat3d> gradient;
+  displacement_gradients(gradient);
+  std::vector<PhyxelMotion> motions;
+  motions.reserve(phyxels.size());
+  for (const Index i : phyxels) {
+    motions.push_back({state.displacement[i], state.velocity[i], gradient[i]});
+  }
+  return motions;
+}
+
 void Backend::put_displacements(std::span<const Vec3d> displacement) {
   State state;
   download(state);

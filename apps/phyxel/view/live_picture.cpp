@@ -10,6 +10,7 @@
 
 #include "compose.hpp"
 #include "phyxel/history.hpp"
+#include "phyxel/physics/strain.hpp"
 #include "phyxel/point_fields.hpp"
 #include "program_ranks.hpp"
 #include "report/thinning.hpp"
@@ -86,23 +87,39 @@ Quantised scale_of(std::span<const float> rows, std::size_t each, std::size_t c)
   return {(double{low} + high) / 2, (double{high} - low) / 2};
 }
 
-/// The values of a field on this rank's phyxels.
-std::vector<double> values_of(const LiveScene& live, const State& state, std::size_t field) {
-  std::vector<double> values;
-  const auto lengths = [&](const std::vector<Vec3d>& vectors) {
-    for (const Vec3d& v : vectors) values.push_back(norm(v));
-    return values;
-  };
-  if (field == displacement) return lengths(state.displacement);
-  if (field == speed) return lengths(state.velocity);
+/// The values of a field on all phyxels of this rank. @param field one that motions do not tell
+std::vector<double> values_of(const LiveScene& live, std::size_t field) {
   const auto found = [&](Quantity quantity) {
     return find_fields(live.model(), live.backend(), {{quantity}})[quantity];
   };
   if (field == von_mises) return found(Quantity::von_mises);
-  if (field == volume_ratio) return found(Quantity::volume_ratio);
+  State state;
+  live.backend().download(state);
   const std::size_t column = field - always;
   if (column < state.history.size()) return state.history[column].values;
   return found(Quantity::broken);
+}
+
+/// The values of a field on some phyxels of this rank. @param field its number; below 0 for none
+std::vector<double> values_of(const LiveScene& live, const std::vector<Index>& phyxels,
+                              const std::vector<PhyxelMotion>& motions, std::int32_t field) {
+  std::vector<double> values(phyxels.size());
+  const auto set = [&](auto&& value_of) {
+    std::transform(motions.begin(), motions.end(), values.begin(), value_of);
+  };
+  if (field < 0) return values;
+  const auto number = static_cast<std::size_t>(field);
+  if (number == displacement) {
+    set([](const PhyxelMotion& motion) { return norm(motion.displacement); });
+  } else if (number == speed) {
+    set([](const PhyxelMotion& motion) { return norm(motion.velocity); });
+  } else if (number == volume_ratio) {
+    set([](const PhyxelMotion& motion) { return 1 + volume_change(motion.gradient); });
+  } else {
+    const std::vector<double> all = values_of(live, number);
+    std::transform(phyxels.begin(), phyxels.end(), values.begin(), [&](Index i) { return all[i]; });
+  }
+  return values;
 }
 
 /// Numbers of a phyxel that ranks send: displacement, gradient, field.
@@ -204,21 +221,18 @@ void LivePicture::find_rows(const Model& model) {
 
 std::shared_ptr<const std::string> LivePicture::frame(const LiveScene& live, std::int32_t field,
                                                       std::uint32_t number) const {
-  State state;
-  live.backend().download(state);
-  std::vector<Mat3d> gradient;
-  live.backend().displacement_gradients(gradient);
-  const std::vector<double> values = field < 0
-                                         ? std::vector<double>(state.displacement.size())
-                                         : values_of(live, state, static_cast<std::size_t>(field));
+  const std::vector<PhyxelMotion> motions = live.backend().motions_of(here_);
+  const std::vector<double> values = values_of(live, here_, motions, field);
   std::vector<float> sent;
   sent.reserve(sent_each * here_.size());
-  for (const Index i : here_) {
+  for (std::size_t k = 0; k < motions.size(); ++k) {
     for (int axis = 0; axis < 3; ++axis) {
-      sent.push_back(static_cast<float>(component(state.displacement[i], axis)));
+      sent.push_back(static_cast<float>(component(motions[k].displacement, axis)));
     }
-    for (int e = 0; e < 9; ++e) sent.push_back(static_cast<float>(gradient[i](e / 3, e % 3)));
-    sent.push_back(static_cast<float>(values[i]));
+    for (int e = 0; e < 9; ++e) {
+      sent.push_back(static_cast<float>(motions[k].gradient(e / 3, e % 3)));
+    }
+    sent.push_back(static_cast<float>(values[k]));
   }
   const std::vector<float> rows = ranks().gathered(std::span<const float>(sent));
   const std::vector<RigidState> rigid = live.backend().rigid_states();

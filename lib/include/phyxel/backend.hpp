@@ -86,6 +86,13 @@ struct StateView {
   }
 };
 
+/// How a phyxel moves at the present time.
+struct PhyxelMotion {
+  Vec3d displacement;  ///< u(t) [m].
+  Vec3d velocity;      ///< v(t - dt/2) [m/s].
+  Mat3d gradient;      ///< ∇u of the fit of its neighbours.
+};
+
 /// Owns the live arrays of one device and the kernels over them. `upload` and `download` copy all
 /// of a state in and out; on the CPU `view` shows it where it is. `step` alone changes the state;
 /// all other verbs evaluate it as it is, and leave what laws remember untouched.
@@ -173,6 +180,10 @@ class Backend {
   virtual void internal_forces(std::vector<Vec3d>& force, HistoryUse use = HistoryUse::trial) = 0;
   /// Displacement gradients at the present displacements, shape [n].
   virtual void displacement_gradients(std::vector<Mat3d>& gradient) = 0;
+  /// The motions of some phyxels, shape [phyxels], of which alone a device tells the host: for
+  /// pictures of large bodies. Of a share: collective.
+  /// @param phyxels their numbers, in any order
+  virtual std::vector<PhyxelMotion> motions_of(std::span<const Index> phyxels);
   /// Σ_j w_ij |u_j - u_i - ∇u_i x_ij|² at the present displacements [m²], shape [n]: what hourglass
   /// control holds small.
   /// @throws InputError if this backend has no such control.

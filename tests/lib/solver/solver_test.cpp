@@ -354,6 +354,36 @@ std::pair<double, double> measured_constants(const char* law) {
   return {stress / (axial / count), -lateral / axial};
 }
 
+TEST(Motions, OfChosenPhyxelsAreThoseOfAll) {
+  const Scene scene = one_body(rubber());
+  const Model model = model_of(scene, lattice(7, 6, 5, 0.05));
+  State state = initial_state(model, scene, 1e-6);
+  for (Index i = 0; i < model.size(); ++i) {
+    const Vec3d x = model.position[i];
+    state.displacement[i] = {1e-3 * x.x * x.y, 2e-3 * x.z * x.z, -1e-3 * x.x * x.z};
+    state.velocity[i] = {x.z, -x.x, 3 * x.y};
+  }
+  const std::vector<Index> chosen{17, 3, 3, model.size() - 1, 0};
+  for (const Precision precision : {Precision::double_, Precision::mixed, Precision::single}) {
+    const auto backend = make_test_backend(model, precision);
+    backend->upload(state);
+    State all;
+    backend->download(all);
+    std::vector<Mat3d> gradient;
+    backend->displacement_gradients(gradient);
+    const std::vector<PhyxelMotion> motions = backend->motions_of(chosen);
+    ASSERT_EQ(motions.size(), chosen.size());
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      EXPECT_EQ(motions[k].displacement, all.displacement[chosen[k]]);
+      EXPECT_EQ(motions[k].velocity, all.velocity[chosen[k]]);
+      for (int e = 0; e < 9; ++e) {
+        EXPECT_EQ(motions[k].gradient(e / 3, e % 3), gradient[chosen[k]](e / 3, e % 3));
+      }
+    }
+    EXPECT_TRUE(backend->motions_of({}).empty());
+  }
+}
+
 TEST(Tension, GivesBackYoungsModulusAndPoissonsRatio) {
   for (const char* law : {"st-venant-kirchhoff", "small-strain"}) {
     const auto [young, poisson] = measured_constants(law);
