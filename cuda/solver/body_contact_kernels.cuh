@@ -117,11 +117,14 @@ __global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, P
   s.forces[p] = {};
 }
 
-/// Sets where points are at the end of a step, before contact, and the largest of their ways there.
-/// One thread per point.
+/// Sets where points are at the end of a step, before contact, and the largest of their ways there;
+/// forces act on no point yet. One thread per point, those of other devices included.
+/// @param is_active as of `ContactPasses`, shape [points]
 template <class Real, class StateReal>
-__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, PointWay* way) {
+__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, PointWay* way,
+                           char* is_active, int points) {
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p < points) is_active[p] = 0;
   double length = 0;
   if (p < s.count) {
     const Vec3<double> after = s.position[p] + displacement_at(f, s.place[p]);

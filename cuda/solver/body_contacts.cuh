@@ -194,11 +194,10 @@ class DeviceBodyContacts {
   }
 
   void end_motion() const {
-    m_.launch_each("end_motion", cuda::end_motion<Real, StateReal>, count(), m_.fields(), places(),
-                   way_.data());
+    m_.launch_each("end_motion", cuda::end_motion<Real, StateReal>, points(), m_.fields(), places(),
+                   way_.data(), is_active_.data(), points());
   }
   void find_touches(const ContactPasses& passes) const {
-    PHYXEL_CUDA(cudaMemsetAsync(is_active_.data(), 0, is_active_.bytes(), m_.stream()));
     if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, rows());
     launch_groups("find_touches", cuda::find_touches, rows(), passes, rows());
   }

@@ -26,6 +26,8 @@ class ThreadGroup {
     for (Offset k = start[thread_]; k < start[thread_ + 1]; ++k) each(k);
   }
   __device__ int part() const { return thread_; }
+  __device__ Offset first_of(const Offset* start) const { return start[thread_]; }
+  __device__ Offset end_of(const Offset* start) const { return start[thread_ + 1]; }
   __device__ double sum(double part) const {
     for (int way = size / 2; way > 0; way /= 2) part += __shfl_xor_sync(mask_, part, way);
     return part;

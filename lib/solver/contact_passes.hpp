@@ -73,7 +73,8 @@ struct ContactPasses {
   /// `entries_of`, and the number of these entries.
   SurfaceCarrier* carriers = nullptr;
   Index* carrier_count = nullptr;  ///< Shape [contact_threads, points].
-  /// Of each entry: true if it is of its row's patch; null if no point is beside several.
+  /// Of each entry within range: true if it is of its row's patch; null if no point is beside
+  /// several.
   char* in_patch = nullptr;
   double* share = nullptr;  ///< c of each point [m²].
   /// Of each row: the way of all points up to which none of its list can come within range [m]. A
@@ -100,9 +101,10 @@ struct ContactPasses {
   PHYXEL_HD void find_patch(const Threads& threads, Index r) const {
     const ContactRow& here = row[r];
     if (here.patches == 1 || is_asleep(r)) return;
-    const SurfacePatches patches(threads, site[here.point], motion[here.point], entries_of_row(r),
+    const WithinRange in_range(threads, motion[here.point], entries_of_row(r), motions());
+    const SurfacePatches patches(in_range, site[here.point], motion[here.point], entries_of_row(r),
                                  sites(), motions(), here.patches);
-    threads.each(entries_of_row(r), [&](Offset e) {
+    in_range.each(entries_of_row(r), [&](Offset e) {
       in_patch[e] = here.patch < patches.count() && patches.of(site[near[e]].rest) == here.patch;
     });
   }
@@ -111,11 +113,13 @@ struct ContactPasses {
     if (is_asleep(r)) return;
     const ContactRow& here = row[r];
     if (touch[r].is_inside) threads.each(entries_of_row(r), [&](Offset e) { carries[e] = {}; });
-    const SurfaceTouch found = surface_touch(
-        OfPatch(threads, in_patch), site[here.point], motion[here.point], entries_of_row(r),
-        sites(), motions(), field[here.body], here.apart, reach, carries);
+    const OfPatch of_patch(threads, here.patches == 1 ? nullptr : in_patch);
+    const WithinRange in_range(of_patch, motion[here.point], entries_of_row(r), motions());
+    const SurfaceTouch found =
+        surface_touch(in_range, site[here.point], motion[here.point], entries_of_row(r), sites(),
+                      motions(), field[here.body], here.apart, reach, carries);
     if (is_active && found.is_inside) {
-      threads.each(entries_of_row(r), [&](Offset e) {
+      in_range.each(entries_of_row(r), [&](Offset e) {
         if (carries[e].weight > 0) is_active[near[e]] = 1;
       });
     }

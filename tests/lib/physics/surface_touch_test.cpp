@@ -104,6 +104,7 @@ class Patches : public ::testing::Test {
     sites_.push_back({.rest = range * Vec3d{rest, 0, 0}, .range = range});
     motions_.emplace_back();
     motions_.back().after = range * Vec3d{now, 0, 0};
+    motions_.back().range = range;
     motions_.back().out = {0, 0, faces ? -1.0 : 1.0};
   }
   /// The patch of each phyxel, and the number of patches.

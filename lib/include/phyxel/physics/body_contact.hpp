@@ -20,6 +20,7 @@
 
 #include "phyxel/physics/contact.hpp"
 #include "phyxel/physics/distance_field.hpp"
+#include "phyxel/physics/near_lists.hpp"
 #include "phyxel/physics/weight.hpp"
 #include "phyxel/types.hpp"
 
@@ -46,9 +47,10 @@ struct SurfaceSite {
 };
 
 /// The motion of a phyxel of a contact layer over a step, before contact.
-struct SurfaceMotion {
-  Vec3<double> before;   ///< Place at the start of the step [m].
+struct alignas(32) SurfaceMotion {
   Vec3<double> after;    ///< Predicted place at the end of the step [m].
+  double range = 0;      ///< That of its site [m]: beside the place, which it is looked at with.
+  Vec3<double> before;   ///< Place at the start of the step [m].
   Vec3<double> earlier;  ///< Velocity at the start of the step [m/s].
   Vec3<double> probe;    ///< q - x: F times `inward` [m].
   Mat3<double> back;     ///< G: the inverse of its deformation gradient at the start.
@@ -71,9 +73,6 @@ PHYXEL_HD double surface_weight(double square, double range) {
   return weight_shape_anywhere(square, 1 / (range * range));
 }
 
-/// The larger of two ranges, up to which phyxels of two surfaces know of each other [m].
-PHYXEL_HD double common_range(double a, double b) { return a > b ? a : b; }
-
 /// How much of a phyxel of a surface counts for a point: all of one whose surface faces the
 /// point's, so that the other side of a thin part, of a slit, or of the point's own body does not.
 PHYXEL_HD double facing(const SurfaceMotion& point, const SurfaceMotion& other) {
@@ -81,53 +80,17 @@ PHYXEL_HD double facing(const SurfaceMotion& point, const SurfaceMotion& other) 
   return t <= 0 ? 0 : t >= 1 ? 1 : t * t * (3 - 2 * t);
 }
 
-/// Sets the probe, the inverse deformation gradient and the normal of a phyxel.
+/// Sets the range, the probe, the inverse deformation gradient and the normal of a phyxel.
 /// @param gradient of displacement
 PHYXEL_HD void set_gradient(SurfaceMotion& motion, const SurfaceSite& site,
                             const Mat3<double>& gradient) {
+  motion.range = site.range;
   motion.probe = site.inward + gradient * site.inward;
   motion.back = inverse_deformation(gradient);
   const Vec3<double> out = -(transpose(motion.back) * site.inward);
   const double length = std::sqrt(dot(out, out));
   motion.out = length > 0 ? (1 / length) * out : out;
 }
-
-/// Lists of the passes of contact are dealt out among so many threads of a device, by the numbers
-/// that phyxels have in the whole model: sums then do not depend on what else is in a list.
-inline constexpr int contact_threads = 4;
-
-/// The squared distance of a phyxel that is not there [m²].
-inline constexpr double no_square = 1e300;
-
-/// The nearest of the phyxels that a thread has looked at.
-struct NearestPhyxel {
-  double square = no_square;  ///< Of its distance [m²]; `no_square` if there is none.
-  Vec3<double> rest;          ///< [m]
-};
-
-/// The work on a list by one thread. A group of threads of a device may share it instead, each with
-/// one part of the list, all with the same sums.
-struct OneThread {
-  /// Calls each(k) for the entries of this thread's parts of a list.
-  /// @param start of the list's parts, and the end of the last one; shape [contact_threads + 1]
-  template <class Each>
-  PHYXEL_HD void each(const Offset* start, Each&& each) const {
-    for (Offset k = start[0]; k < start[contact_threads]; ++k) each(k);
-  }
-  /// The first part of lists that this thread has.
-  PHYXEL_HD int part() const { return 0; }
-  /// The sum of what the threads have.
-  template <class T>
-  PHYXEL_HD T sum(const T& part) const {
-    return part;
-  }
-  /// The nearest of what the threads have found; of equal ones, the first in the list.
-  PHYXEL_HD NearestPhyxel nearest(const NearestPhyxel& own) const { return own; }
-  /// The least of what the threads have.
-  PHYXEL_HD double least(double own) const { return own; }
-  /// True of the thread that writes what all have found.
-  PHYXEL_HD bool is_first() const { return true; }
-};
 
 /// The weight with which a phyxel of a surface carries the force on a point: that of its distance
 /// times its area, as far as it faces the point, so that a uniform pressure is passed on uniformly,
