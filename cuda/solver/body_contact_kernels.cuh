@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 #include <type_traits>
 
 #include "solver/contact_passes.hpp"
@@ -108,23 +109,22 @@ __global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, P
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (p == 0) add_way(*way);
   if (p >= s.count) return;
-  SurfaceMotion& motion = s.motion[p];
+  SurfaceMotion motion;  // written as a whole: words of one phyxel lie together
+  motion.after = s.motion[p].after;
   motion.before = s.position[p] + displacement_at(f, s.place[p]);
   motion.earlier = to<double>(column3(f.velocity, f.places, s.place[p]));
   Mat3<double> gradient;
   for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + s.entry[p]];
   set_gradient(motion, s.site[p], gradient);
+  s.motion[p] = motion;
   s.forces[p] = {};
 }
 
-/// Sets where points are at the end of a step, before contact, and the largest of their ways there;
-/// forces act on no point yet. One thread per point, those of other devices included.
-/// @param is_active as of `ContactPasses`, shape [points]
+/// Sets where points are at the end of a step, before contact, and the largest of their ways there.
+/// One thread per point.
 template <class Real, class StateReal>
-__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, PointWay* way,
-                           char* is_active, int points) {
+__global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, PointWay* way) {
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
-  if (p < points) is_active[p] = 0;
   double length = 0;
   if (p < s.count) {
     const Vec3<double> after = s.position[p] + displacement_at(f, s.place[p]);
@@ -139,38 +139,94 @@ __global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, Poi
   if (threadIdx.x % 32 == 0 && length > 0) raise_to(&way->in_step, length);
 }
 
-// One group of threads per row or point.
-static __global__ void find_patches(ContactPasses passes, int rows) {
-  const ThreadGroup threads;
-  if (threads.number() < rows) passes.find_patch(threads, threads.number());
+/// Numbers of rows or points that kernels add to a list, in any order: the work on each of them
+/// depends on no other.
+struct NumberList {
+  Index* number;
+  int* count;
+
+  __device__ void add(Index value) const { number[atomicAdd(count, 1)] = value; }
+  /// Calls each(threads, number) for all of them, by groups of threads of any grid.
+  template <class Each>
+  __device__ void for_each(Each&& each) const {
+    const ThreadGroup threads;
+    const int all = *count, groups = static_cast<int>(gridDim.x) * ThreadGroup::in_block;
+    for (int k = threads.number(); k < all; k += groups) each(threads, number[k]);
+  }
+};
+
+/// Lists of the rows and points on which more work is to be done in a step.
+struct ContactLists {
+  NumberList near;       ///< Rows whose bodies are near their points.
+  NumberList inside;     ///< Rows whose points are inside.
+  NumberList active;     ///< Points on which forces act, those of other devices included.
+  std::uint64_t* range;  ///< Of each row: its entries within range, shape [rows, contact_threads].
+
+  __device__ std::uint64_t& range_of(const ThreadGroup& threads, Index r) const {
+    return range[contact_threads * static_cast<Offset>(r) + threads.part()];
+  }
+  /// The entries of a near row within range, of some threads.
+  __device__ WithinRange<ThreadGroup> in_range(const ThreadGroup& threads,
+                                               const ContactPasses& passes, Index r) const {
+    return {threads, passes.entries_of_row(r), range_of(threads, r)};
+  }
+};
+
+/// Empties the lists of a step: forces act on no point yet. One thread per point.
+/// @param is_active as of `ContactPasses`, shape [points]
+static __global__ void empty_lists(ContactLists lists, char* is_active, int points) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p == 0) *lists.near.count = *lists.inside.count = *lists.active.count = 0;
+  if (p < points) is_active[p] = 0;
 }
-static __global__ void find_touches(ContactPasses passes, int rows) {
+
+/// Lists the rows whose bodies are near their points. One group of threads per row.
+static __global__ void find_near_rows(ContactPasses passes, ContactLists lists, int rows) {
   const ThreadGroup threads;
-  if (threads.number() < rows) passes.find_touch(threads, threads.number());
+  const Index r = threads.number();
+  if (r >= rows || passes.is_asleep(r)) return;
+  const WithinRange in_range(threads, passes.motion[passes.row[r].point], passes.entries_of_row(r),
+                             passes.motions());
+  if (!passes.comes_near(threads, in_range, r)) return;
+  lists.range_of(threads, r) = in_range.bits();
+  if (threads.is_first()) lists.near.add(r);
 }
-static __global__ void find_carriers(ContactPasses passes, int points) {
-  const ThreadGroup threads;
-  if (threads.number() < points) passes.find_carriers(threads, threads.number());
+// Groups of threads for the numbers of lists.
+static __global__ void find_patches(ContactPasses passes, ContactLists lists) {
+  lists.near.for_each([&](const ThreadGroup& threads, Index r) {
+    passes.find_patch(lists.in_range(threads, passes, r), r);
+  });
 }
-static __global__ void find_shares(ContactPasses passes, int points) {
-  const ThreadGroup threads;
-  if (threads.number() < points) passes.find_share(threads, threads.number());
+/// Blocks per multiprocessor: more of them hide more latency than the registers that spill cost.
+static __global__ void __launch_bounds__(ThreadGroup::block, 4)
+    find_touches(ContactPasses passes, ContactLists lists) {
+  lists.near.for_each([&](const ThreadGroup& threads, Index r) {
+    const bool inside = passes.find_touch_within(threads, lists.in_range(threads, passes, r), r);
+    if (inside && threads.is_first()) lists.inside.add(r);
+  });
 }
-static __global__ void find_responses(ContactPasses passes, int rows) {
-  const ThreadGroup threads;
-  if (threads.number() < rows) passes.find_response(threads, threads.number());
+/// Lists the points on which forces act. One thread per point.
+static __global__ void list_active(const char* is_active, int points, NumberList active) {
+  const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
+  if (p < points && is_active[p]) active.add(p);
 }
-static __global__ void find_row_forces(ContactPasses passes, int rows) {
-  const ThreadGroup threads;
-  if (threads.number() < rows) passes.find_force(threads, threads.number());
+static __global__ void find_carriers(ContactPasses passes, NumberList active) {
+  active.for_each([&](const ThreadGroup& threads, Index p) { passes.find_carriers(threads, p); });
 }
-static __global__ void find_row_pushes(PenaltyPasses passes, int rows) {
-  const ThreadGroup threads;
-  if (threads.number() < rows) passes.find_push(threads, threads.number());
+static __global__ void find_shares(ContactPasses passes, NumberList active) {
+  active.for_each([&](const ThreadGroup& threads, Index p) { passes.find_share(threads, p); });
 }
-static __global__ void find_row_rubs(PenaltyPasses passes, int rows) {
-  const ThreadGroup threads;
-  if (threads.number() < rows) passes.find_rub(threads, threads.number());
+static __global__ void find_responses(ContactPasses passes, NumberList inside) {
+  inside.for_each([&](const ThreadGroup& threads, Index r) { passes.find_response(threads, r); });
+}
+static __global__ void find_row_forces(ContactPasses passes, NumberList inside) {
+  inside.for_each([&](const ThreadGroup& threads, Index r) { passes.find_force(threads, r); });
+}
+static __global__ void find_row_pushes(PenaltyPasses passes, NumberList inside) {
+  inside.for_each([&](const ThreadGroup& threads, Index r) { passes.find_push(threads, r); });
+}
+static __global__ void find_row_rubs(PenaltyPasses passes, NumberList inside) {
+  inside.for_each([&](const ThreadGroup& threads, Index r) { passes.find_rub(threads, r); });
 }
 
 /// Finds the depth of the deepest phyxel of each body in other bodies [m], of this device's points,
@@ -188,14 +244,12 @@ static __global__ void find_depths(ContactPasses passes, const Index* body, cons
   raise_to(deepest + bodies + own, depth / fmin(ranges[own], ranges[passes.row[r].body]));
 }
 
-/// Changes the velocities of points by penalties as a step starts. One group of threads per point.
+/// Changes the velocity of a point by penalties as a step starts.
 /// @param regain 1 over what damping keeps of a velocity, shape [count]
 template <class Real, class StateReal>
-__global__ void push_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
-                           const double* regain) {
-  const ThreadGroup threads;
-  const int p = threads.number();
-  if (p >= s.count || !passes.is_active[p]) return;
+__device__ void push_point(const Fields<Real, StateReal>& f, const ContactPasses& passes,
+                           const SurfacePlaces<Real>& s, const double* regain,
+                           const ThreadGroup& threads, Index p) {
   const Vec3<double> push = passes.forces_on(threads, p).normal;
   if (!threads.is_first()) return;
   s.forces[p].normal += push;
@@ -206,12 +260,10 @@ __global__ void push_apart(Fields<Real, StateReal> f, ContactPasses passes, Surf
               to<StateReal>(to<double>(column3(f.velocity, f.places, at)) + change));
 }
 
-/// Moves points by friction at the end of a step. One group of threads per point.
+/// Moves a point by friction at the end of a step.
 template <class Real, class StateReal>
-__global__ void rub_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
-  const ThreadGroup threads;
-  const int p = threads.number();
-  if (p >= s.count || !passes.is_active[p]) return;
+__device__ void rub_point(const Fields<Real, StateReal>& f, const ContactPasses& passes,
+                          const SurfacePlaces<Real>& s, const ThreadGroup& threads, Index p) {
   const Vec3<double> friction = passes.forces_on(threads, p).tangential;
   if (!threads.is_first()) return;
   s.forces[p].tangential += friction;
@@ -223,12 +275,10 @@ __global__ void rub_apart(Fields<Real, StateReal> f, ContactPasses passes, Surfa
   s.velocity[p] = to<double>(column3(f.velocity, f.places, at));
 }
 
-/// Moves points by the forces on them. One group of threads per point.
+/// Moves a point by the forces on it.
 template <class Real, class StateReal>
-__global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s) {
-  const ThreadGroup threads;
-  const int p = threads.number();
-  if (p >= s.count || !passes.is_active[p]) return;
+__device__ void move_point(const Fields<Real, StateReal>& f, const ContactPasses& passes,
+                           const SurfacePlaces<Real>& s, const ThreadGroup& threads, Index p) {
   const PointForces forces = passes.forces_on(threads, p);
   if (!threads.is_first()) return;
   PointForces& all = s.forces[p];
@@ -245,6 +295,29 @@ __global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, Surf
   record.u = to<Real>(u);
   f.points.set(at, record);
   s.velocity[p] = to<double>(v);
+}
+
+// Groups of threads for the active points of this device.
+template <class Real, class StateReal>
+__global__ void push_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
+                           const double* regain, NumberList active) {
+  active.for_each([&](const ThreadGroup& threads, Index p) {
+    if (p < s.count) push_point(f, passes, s, regain, threads, p);
+  });
+}
+template <class Real, class StateReal>
+__global__ void rub_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
+                          NumberList active) {
+  active.for_each([&](const ThreadGroup& threads, Index p) {
+    if (p < s.count) rub_point(f, passes, s, threads, p);
+  });
+}
+template <class Real, class StateReal>
+__global__ void move_apart(Fields<Real, StateReal> f, ContactPasses passes, SurfacePlaces<Real> s,
+                           NumberList active) {
+  active.for_each([&](const ThreadGroup& threads, Index p) {
+    if (p < s.count) move_point(f, passes, s, threads, p);
+  });
 }
 
 /// Adds what the forces of all sweeps do to the sums of the bodies. One thread per point.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <map>
 #include <string>
 #include <utility>
@@ -105,9 +106,9 @@ class DeviceBodyContacts {
     if (m_.share()) refresh(motion_);
     find_touches(passes);
     find_carriers(passes);
-    launch_groups("find_row_pushes", find_row_pushes, rows(), passes, rows());
-    launch_groups("push_apart", cuda::push_apart<Real, StateReal>, count(), m_.fields(), passes,
-                  places(), regain_.data());
+    launch_groups("find_row_pushes", find_row_pushes, rows(), passes, lists_of_step().inside);
+    launch_groups("push_apart", cuda::push_apart<Real, StateReal>, points(), m_.fields(), passes,
+                  places(), regain_.data(), lists_of_step().active);
   }
   /// Moves phyxels that the step has led into bodies out of them, or lets those rub that penalties
   /// push. Of a share: collective.
@@ -166,14 +167,15 @@ class DeviceBodyContacts {
   }
   std::size_t bytes() const {
     if (!acts()) return 0;
-    std::size_t bytes = fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() +
-                        layer_found_.bytes() + group_begin_.bytes() + group_end_.bytes() +
-                        ways_.bytes() + sums_.bytes() + points_.bytes() + motion_.bytes() +
-                        velocity_.bytes() + response_.bytes() + carries_.bytes() +
-                        carriers_.bytes() + carrier_count_.bytes() + in_patch_.bytes() +
-                        touch_.bytes() + force_.bytes() + share_.bytes() + forces_.bytes() +
-                        gradients_.bytes() + regain_.bytes() + modulus_.bytes() + wakes_.bytes() +
-                        is_inside_.bytes() + is_active_.bytes() + way_.bytes();
+    std::size_t bytes =
+        fields_.bytes() + layer_place_.bytes() + layer_position_.bytes() + layer_found_.bytes() +
+        group_begin_.bytes() + group_end_.bytes() + ways_.bytes() + sums_.bytes() +
+        points_.bytes() + motion_.bytes() + velocity_.bytes() + response_.bytes() +
+        carries_.bytes() + carriers_.bytes() + carrier_count_.bytes() + in_patch_.bytes() +
+        touch_.bytes() + force_.bytes() + share_.bytes() + forces_.bytes() + gradients_.bytes() +
+        regain_.bytes() + modulus_.bytes() + wakes_.bytes() + is_inside_.bytes() +
+        is_active_.bytes() + way_.bytes() + near_rows_.bytes() + inside_rows_.bytes() +
+        active_points_.bytes() + in_range_.bytes() + list_counts_.bytes();
     for (const DeviceDistances& distances : distances_) bytes += distances.bytes();
     return bytes;
   }
@@ -194,15 +196,25 @@ class DeviceBodyContacts {
   }
 
   void end_motion() const {
-    m_.launch_each("end_motion", cuda::end_motion<Real, StateReal>, points(), m_.fields(), places(),
-                   way_.data(), is_active_.data(), points());
+    m_.launch_each("end_motion", cuda::end_motion<Real, StateReal>, count(), m_.fields(), places(),
+                   way_.data());
   }
   void find_touches(const ContactPasses& passes) const {
-    if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, rows());
-    launch_groups("find_touches", cuda::find_touches, rows(), passes, rows());
+    const ContactLists of_step = lists_of_step();
+    m_.launch_each("empty_lists", empty_lists, points(), of_step, is_active_.data(), points());
+    launch_whole("find_near_rows", find_near_rows, rows(), passes, of_step, rows());
+    if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, of_step);
+    launch_groups("find_touches", cuda::find_touches, rows(), passes, of_step);
   }
   void find_carriers(const ContactPasses& passes) const {
-    launch_groups("find_carriers", cuda::find_carriers, points(), passes, points());
+    const NumberList active = lists_of_step().active;
+    m_.launch_each("list_active", list_active, points(), is_active_.data(), points(), active);
+    launch_groups("find_carriers", cuda::find_carriers, points(), passes, active);
+  }
+  /// Finds the shares of active points and the responses of rows whose points are inside.
+  void find_responses(const ContactPasses& passes) const {
+    launch_groups("find_shares", find_shares, points(), passes, lists_of_step().active);
+    launch_groups("find_responses", cuda::find_responses, rows(), passes, lists_of_step().inside);
   }
   /// Moves phyxels out of the bodies that the step has led them into.
   void move_apart() {
@@ -213,24 +225,22 @@ class DeviceBodyContacts {
     }
     find_touches(passes);
     find_carriers(passes);
-    launch_groups("find_shares", find_shares, points(), passes, points());
-    launch_groups("find_responses", find_responses, rows(), passes, rows());
+    find_responses(passes);
     for (int sweep = 0; sweep < m_.model().body_contact.sweeps; ++sweep) {
       if (sweep > 0 && m_.share()) refresh(velocity_);
-      launch_groups("find_row_forces", find_row_forces, rows(), passes, rows());
-      launch_groups("move_apart", cuda::move_apart<Real, StateReal>, count(), m_.fields(), passes,
-                    places());
+      launch_groups("find_row_forces", find_row_forces, rows(), passes, lists_of_step().inside);
+      launch_groups("move_apart", cuda::move_apart<Real, StateReal>, points(), m_.fields(), passes,
+                    places(), lists_of_step().active);
     }
   }
   /// Adds friction to penalties.
   void rub_apart() {
     const PenaltyPasses passes = penalties();
     if (m_.share()) refresh(velocity_);
-    launch_groups("find_shares", find_shares, points(), passes, points());
-    launch_groups("find_responses", find_responses, rows(), passes, rows());
-    launch_groups("find_row_rubs", find_row_rubs, rows(), passes, rows());
-    launch_groups("rub_apart", cuda::rub_apart<Real, StateReal>, count(), m_.fields(), passes,
-                  places());
+    find_responses(passes);
+    launch_groups("find_row_rubs", find_row_rubs, rows(), passes, lists_of_step().inside);
+    launch_groups("rub_apart", cuda::rub_apart<Real, StateReal>, points(), m_.fields(), passes,
+                  places(), lists_of_step().active);
   }
   PenaltyPasses penalties() const {
     return {passes(), modulus_.data(), share_of_layer * m_.model().body_contact.penalty};
@@ -311,6 +321,11 @@ class DeviceBodyContacts {
     make_cleared(carries_, lists().near.size());
     make(carriers_, lists().near.size());
     make(carrier_count_, contact_threads * points);
+    make(near_rows_, rows);
+    make(inside_rows_, rows);
+    make(active_points_, points);
+    make(in_range_, contact_threads * rows);
+    make_cleared(list_counts_, 3);
     make(response_, rows);
     make(force_, rows);
     in_patch_ = {};
@@ -325,13 +340,27 @@ class DeviceBodyContacts {
 
   /// Launches a group of threads for each of `count` rows or points.
   template <class... Parameters, class... Arguments>
-  void launch_groups(const char* kernel_name, void (*kernel)(Parameters...), int count,
-                     Arguments... arguments) const {
+  void launch_whole(const char* kernel_name, void (*kernel)(Parameters...), int count,
+                    Arguments... arguments) const {
     constexpr unsigned groups = ThreadGroup::in_block, threads = ThreadGroup::block;
     const unsigned blocks = (static_cast<unsigned>(count) + groups - 1) / groups;
     if (blocks == 0) return;
     kernel<<<blocks, threads, 0, m_.stream()>>>(arguments...);
     m_.launched(kernel_name, blocks, threads);
+  }
+  /// Launches groups of threads for a list of at most `count` rows or points (`NumberList`).
+  template <class... Parameters, class... Arguments>
+  void launch_groups(const char* kernel_name, void (*kernel)(Parameters...), int count,
+                     Arguments... arguments) const {
+    constexpr int most = 2048 * ThreadGroup::in_block;  // enough for any device
+    launch_whole(kernel_name, kernel, std::min(count, most), arguments...);
+  }
+  /// The lists that each step fills anew.
+  ContactLists lists_of_step() const {
+    return {{near_rows_.data(), list_counts_.data()},
+            {inside_rows_.data(), list_counts_.data() + 1},
+            {active_points_.data(), list_counts_.data() + 2},
+            in_range_.data()};
   }
   template <class T>
   void refresh(DeviceArray<T>& of_points) {
@@ -416,6 +445,10 @@ class DeviceBodyContacts {
   DeviceArray<double> share_, wakes_;
   DeviceArray<PointWay> way_;  // one
   DeviceArray<char> is_inside_, is_active_;
+  // As of `ContactLists`.
+  DeviceArray<Index> near_rows_, inside_rows_, active_points_;
+  DeviceArray<std::uint64_t> in_range_;
+  DeviceArray<int> list_counts_;
 };
 
 }  // namespace phyxel::cuda

@@ -104,7 +104,6 @@ void BodyContacts::find_touches() {
   const auto rows = static_cast<Index>(touches_.size());
 #pragma omp parallel for schedule(dynamic, 64) num_threads(threads_here())
   for (Index r = 0; r < rows; ++r) {
-    passes.find_patch(OneThread{}, r);
     passes.find_touch(OneThread{}, r);
   }
 }

@@ -66,7 +66,6 @@ void BodyPenalty::find_touches() {
                              .in_patch = in_patch.empty() ? nullptr : in_patch.data(),
                              .reach = reach};
   for (std::size_t r = 0; r < touches.size(); ++r) {
-    passes.find_patch(OneThread{}, static_cast<Index>(r));
     passes.find_touch(OneThread{}, static_cast<Index>(r));
   }
   double moved = knows_shapes_ ? 0 : HUGE_VAL;  // as a share of ranges

@@ -43,7 +43,7 @@ PHYXEL_HD Vec3<double> along_free_axes(const SurfaceSite& site, Vec3<double> v) 
   return {m.x > 0 ? v.x : 0.0, m.y > 0 ? v.y : 0.0, m.z > 0 ? v.z : 0.0};
 }
 
-/// The arrays of the passes. Whoever fills them runs `find_patch` and `find_touch` for all rows,
+/// The arrays of the passes. Whoever fills them runs `find_touch` for all rows,
 /// `find_carriers` and `find_share` for all points on which forces may act, and `find_response` for
 /// all rows; then, in each sweep, `find_force` for all rows and `forces_on` for its own points,
 /// whose velocities it changes. Each is run by one thread (`OneThread`) or by a group that shares
@@ -95,40 +95,63 @@ struct ContactPasses {
   PHYXEL_HD auto motions() const {
     return [this](Offset e) -> const SurfaceMotion& { return motion[near[e]]; };
   }
+  /// The list of a row, as of `OneThread::each`.
+  PHYXEL_HD const Offset* entries_of_row(Index r) const {
+    return near_start + contact_threads * static_cast<Offset>(r);
+  }
+  /// True if a row sleeps in this step.
+  PHYXEL_HD bool is_asleep(Index r) const { return wakes && way->sum() < wakes[r]; }
 
-  /// Marks the entries of a row that are in its patch, if its point is beside several patches.
+  /// Finds whether a row's point is inside the body, and who carries it.
   template <class Threads>
-  PHYXEL_HD void find_patch(const Threads& threads, Index r) const {
+  PHYXEL_HD void find_touch(const Threads& threads, Index r) const {
+    if (is_asleep(r)) return;
+    const WithinRange in_range(threads, motion[row[r].point], entries_of_row(r), motions());
+    if (!comes_near(threads, in_range, r)) return;
+    find_patch(in_range, r);
+    find_touch_within(threads, in_range, r);
+  }
+  /// The same in three parts, for devices. First: true if a row's body is so near that its point
+  /// may be inside; if not, the row's touch is known. @param in_range its entries within range
+  template <class Threads>
+  PHYXEL_HD bool comes_near(const Threads& threads, const WithinRange<Threads>& in_range,
+                            Index r) const {
+    if (touch[r].is_inside) threads.each(entries_of_row(r), [&](Offset e) { carries[e] = {}; });
+    const WeightsNear near_here =
+        weights_near(in_range, motion[row[r].point], entries_of_row(r), motions());
+    if (near_here.tell()) return true;
+    SurfaceTouch found;
+    found.is_alone = !(near_here.nearness > 0);
+    set_touch(threads, r, found);
+    return false;
+  }
+  /// Second: marks the entries of a row that are in its patch, if its point is beside several.
+  template <class Threads>
+  PHYXEL_HD void find_patch(const WithinRange<Threads>& in_range, Index r) const {
     const ContactRow& here = row[r];
-    if (here.patches == 1 || is_asleep(r)) return;
-    const WithinRange in_range(threads, motion[here.point], entries_of_row(r), motions());
+    if (here.patches == 1) return;
     const SurfacePatches patches(in_range, site[here.point], motion[here.point], entries_of_row(r),
                                  sites(), motions(), here.patches);
     in_range.each(entries_of_row(r), [&](Offset e) {
       in_patch[e] = here.patch < patches.count() && patches.of(site[near[e]].rest) == here.patch;
     });
   }
+  /// Third: finds the touch of a row that comes near. @returns true if its point is inside
   template <class Threads>
-  PHYXEL_HD void find_touch(const Threads& threads, Index r) const {
-    if (is_asleep(r)) return;
+  PHYXEL_HD bool find_touch_within(const Threads& threads, const WithinRange<Threads>& in_range,
+                                   Index r) const {
     const ContactRow& here = row[r];
-    if (touch[r].is_inside) threads.each(entries_of_row(r), [&](Offset e) { carries[e] = {}; });
-    const OfPatch of_patch(threads, here.patches == 1 ? nullptr : in_patch);
-    const WithinRange in_range(of_patch, motion[here.point], entries_of_row(r), motions());
+    const OfPatch of_patch(in_range, here.patches == 1 ? nullptr : in_patch);
     const SurfaceTouch found =
-        surface_touch(in_range, site[here.point], motion[here.point], entries_of_row(r), sites(),
+        surface_touch(of_patch, site[here.point], motion[here.point], entries_of_row(r), sites(),
                       motions(), field[here.body], here.apart, reach, carries);
     if (is_active && found.is_inside) {
       in_range.each(entries_of_row(r), [&](Offset e) {
         if (carries[e].weight > 0) is_active[near[e]] = 1;
       });
     }
-    const double wakes_at = wakes && found.is_alone ? waking_of(threads, r) : 0;
-    if (!threads.is_first()) return;
-    touch[r] = found;
-    if (is_inside) is_inside[r] = found.is_inside;
-    if (is_active && found.is_inside) is_active[here.point] = 1;
-    if (wakes) wakes[r] = wakes_at;
+    set_touch(threads, r, found);
+    return found.is_inside;
   }
   /// Finds the entries by which other bodies act on a point.
   template <class Threads>
@@ -213,8 +236,16 @@ struct ContactPasses {
   }
 
  protected:
-  /// True if a row sleeps in this step.
-  PHYXEL_HD bool is_asleep(Index r) const { return wakes && way->sum() < wakes[r]; }
+  /// Sets the touch of a row, and until when it sleeps.
+  template <class Threads>
+  PHYXEL_HD void set_touch(const Threads& threads, Index r, const SurfaceTouch& found) const {
+    const double wakes_at = wakes && found.is_alone ? waking_of(threads, r) : 0;
+    if (!threads.is_first()) return;
+    touch[r] = found;
+    if (is_inside) is_inside[r] = found.is_inside;
+    if (is_active && found.is_inside) is_active[row[r].point] = 1;
+    if (wakes) wakes[r] = wakes_at;
+  }
   /// The way of all points at which one of a row's list may come within range; they may move by as
   /// much as its point.
   template <class Threads>
@@ -229,9 +260,6 @@ struct ContactPasses {
     });
     constexpr double almost_half = 0.499;  // by rounding
     return way->sum() + almost_half * threads.least(least);
-  }
-  PHYXEL_HD const Offset* entries_of_row(Index r) const {
-    return near_start + contact_threads * static_cast<Offset>(r);
   }
   PHYXEL_HD const Offset* entries_of_point(Index p) const {
     return entries_of_start + contact_threads * static_cast<Offset>(p);

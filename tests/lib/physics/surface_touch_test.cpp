@@ -43,11 +43,13 @@ class Touched : public ::testing::Test {
     for (std::size_t k = 0; k < surface.size(); ++k) {
       sites[k] = {.rest = surface[k].rest, .area = 1e-4, .range = range};
       motions[k].after = motions[k].before = surface[k].now;
+      motions[k].range = range;
       motions[k].back = identity<double>();
       motions[k].out = {0, 0, -1};
     }
     SurfaceSite site{.range = range};
     SurfaceMotion point;
+    point.range = range;
     point.out = {0, 0, 1};
     const std::vector<Offset> list{
         0, static_cast<Offset>(surface.size()), static_cast<Offset>(surface.size()),
@@ -177,7 +179,11 @@ TEST_F(Patches, ShareTheEntriesOfAPointAmongItsRows) {
                              .near_start = start.data(),
                              .near = near.data(),
                              .in_patch = in_patch.data()};
-  for (Index r = 0; r < most_patches; ++r) passes.find_patch(OneThread{}, r);
+  const OneThread thread;
+  for (Index r = 0; r < most_patches; ++r) {
+    passes.find_patch(WithinRange(thread, motions_[0], passes.entries_of_row(r), passes.motions()),
+                      r);
+  }
   EXPECT_EQ(in_patch, (std::vector<char>{0, 0, 1, 1, 1, 0, 0, 0, 0}));
 }
 

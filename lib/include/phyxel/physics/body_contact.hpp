@@ -194,6 +194,47 @@ struct PlaceAtRest {
 /// Weight of phyxels below which they say nothing of a place.
 inline constexpr double least_weight = 0.05;
 
+/// What the phyxels of a surface near a point weigh.
+struct SurfaceWeights {
+  const SurfaceMotion& point;
+
+  /// The weight of a phyxel by its distance alone.
+  PHYXEL_HD double nearness(const SurfaceMotion& other) const {
+    const Vec3<double> apart = other.after - point.after;
+    return surface_weight(dot(apart, apart), common_range(point.range, other.range));
+  }
+  /// The weight as far as it faces the point. Most are out of range, which tells it alone.
+  PHYXEL_HD double weight(const SurfaceMotion& other) const {
+    const double near = nearness(other);
+    return near > 0 ? facing(point, other) * near : 0.0;
+  }
+};
+
+/// The sums of the weights of the phyxels of a surface near a point.
+struct WeightsNear {
+  double facing = 0;    ///< Of `SurfaceWeights::weight`.
+  double nearness = 0;  ///< Of `SurfaceWeights::nearness`, of those that face the point.
+
+  /// True if the surface is so near that it tells where the point is.
+  PHYXEL_HD bool tell() const { return facing > 0 && nearness > least_weight; }
+};
+
+/// Finds these sums. The parameters are those of `surface_touch`.
+template <class Threads, class MotionOf>
+PHYXEL_HD WeightsNear weights_near(const Threads& threads, const SurfaceMotion& point,
+                                   const Offset* list, MotionOf&& motion_of) {
+  const SurfaceWeights weigh{point};
+  WeightsNear all;
+  threads.each(list, [&](Offset k) {
+    const SurfaceMotion& other = motion_of(k);
+    const double w = weigh.weight(other);
+    if (!(w > 0)) return;
+    all.facing += w;
+    all.nearness += weigh.nearness(other);
+  });
+  return {threads.sum(all.facing), threads.sum(all.nearness)};
+}
+
 /// Finds where the place q of a point is at rest. The parameters are those of `surface_touch`.
 template <class Threads, class SiteOf, class MotionOf>
 PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& site,
@@ -202,27 +243,20 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
                                     const PlacedDistances& field) {
   PlaceAtRest found;
   const Vec3<double> q = point.after + point.probe;
-  const auto nearness_of = [&](Offset k) {
-    const Vec3<double> apart = motion_of(k).after - point.after;
-    return surface_weight(dot(apart, apart), common_range(site.range, site_of(k).range));
-  };
-  // Most entries are out of range, which their distance alone tells.
-  const auto weight_of = [&](Offset k) {
-    const double nearness = nearness_of(k);
-    return nearness > 0 ? facing(point, motion_of(k)) * nearness : 0.0;
-  };
+  const SurfaceWeights weigh{point};
   Mat3<double> back{};                  // Σ w G
   Vec3<double> rest{}, led{}, apart{};  // Σ w X, Σ w G (q - y), Σ w (q - y)
-  double level = 0, weights = 0;        // Σ w φ(X), Σ w
-  Vec3<double> here{};                  // Σ w (X + G (q - y)), from the point at rest
-  double square = 0;                    // Σ w of its square
+  double level = 0;                     // Σ w φ(X)
+  WeightsNear near;
+  Vec3<double> here{};  // Σ w (X + G (q - y)), from the point at rest
+  double square = 0;    // Σ w of its square
   threads.each(list, [&](Offset k) {
     const SurfaceMotion& other = motion_of(k);
-    const double w = weight_of(k);
+    const double w = weigh.weight(other);
     if (!(w > 0)) return;
     const Vec3<double> way = q - other.after;
-    weights += w;
-    found.weights += nearness_of(k);
+    near.facing += w;
+    near.nearness += weigh.nearness(other);
     back += w * other.back;
     rest += w * site_of(k).rest;
     const Vec3<double> whole = other.back * way, at = site_of(k).rest - site.rest + whole;
@@ -232,10 +266,10 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
     apart += w * way;
     level += w * site_of(k).level;
   });
-  weights = threads.sum(weights);
-  found.weights = threads.sum(found.weights);
-  if (!(weights > 0 && found.weights > least_weight)) return found;
-  const double scale = 1 / weights;
+  near = {threads.sum(near.facing), threads.sum(near.nearness)};
+  found.weights = near.nearness;
+  if (!near.tell()) return found;
+  const double scale = 1 / near.facing;
   back = scale * threads.sum(back);
   found.place = scale * (threads.sum(rest) + 0.5 * (threads.sum(led) + back * threads.sum(apart)));
   here = scale * threads.sum(here);
@@ -249,7 +283,7 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
     Vec3<double> normal{};
     threads.each(list, [&](Offset k) {
       const SurfaceMotion& other = motion_of(k);
-      const double w = weight_of(k);
+      const double w = weigh.weight(other);
       if (!(w > 0)) return;
       const Vec3<double> at = site_of(k).rest + other.back * (q - other.after);
       const Gap own = deformed_gap(field.gap(at), own_level, other.back);

@@ -82,6 +82,12 @@ class WithinRange {
     });
   }
 
+  /// The same of entries that have been found before. @param near bits of them, of these threads
+  PHYXEL_HD WithinRange(const Threads& threads, const Offset* list, std::uint64_t near)
+      : threads_(threads), first_(threads.first_of(list)), near_(near) {}
+
+  /// A bit of each entry within range, of the first 64 of a thread.
+  PHYXEL_HD std::uint64_t bits() const { return near_; }
   /// As of `OneThread`, for the entries within range. @param start that of the list
   template <class Each>
   PHYXEL_HD void each(const Offset* start, Each&& each) const {

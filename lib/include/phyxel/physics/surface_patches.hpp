@@ -101,9 +101,6 @@ class OfPatch {
     });
   }
   /// As of `OneThread`.
-  PHYXEL_HD Offset first_of(const Offset* start) const { return threads_.first_of(start); }
-  PHYXEL_HD Offset end_of(const Offset* start) const { return threads_.end_of(start); }
-  /// As of `OneThread`.
   template <class T>
   PHYXEL_HD T sum(const T& part) const {
     return threads_.sum(part);
