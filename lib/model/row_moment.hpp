@@ -4,15 +4,9 @@
 #include "model/parts.hpp"
 #include "model/row_weights.hpp"
 #include "phyxel/model.hpp"
-#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/row_moment.hpp"
 
 namespace phyxel {
-
-/// Sums over the neighbours of a phyxel.
-struct RowMoment {
-  Sym3d moment;  ///< A = Σ_j w_ij x_ij x_ijᵀ [m²]
-  Vec3d offset;  ///< b = Σ_j w_ij x_ij [m]
-};
 
 /// Returns the sums over the neighbours j of phyxel i for which counts(j) is true, in the order of
 /// its list.
@@ -23,9 +17,7 @@ RowMoment moment_of_row(const Model& model, Index i, Counts&& counts) {
   for (const Index j : model.neighbourhood.neighbours.row(i)) {
     if (!counts(j)) continue;
     const Vec3d x = model.position[j] - model.position[i];
-    const double w = weights(j, dot(x, x));
-    sums.moment += moment_term(x, w);
-    sums.offset += w * x;
+    sums.add(x, weights(j, dot(x, x)));
   }
   return sums;
 }

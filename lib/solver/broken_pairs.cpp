@@ -133,6 +133,19 @@ std::size_t BrokenPairs::bytes() const {
   return bytes;
 }
 
+std::vector<char> breaking_bodies(const Model& model) {
+  const std::vector<double>& growth = model.fracture.growth;
+  std::vector<char> breaks;
+  for (const Part& part : model.parts) {
+    const auto body = static_cast<std::size_t>(part.body);
+    breaks.resize(std::max(breaks.size(), body + 1), 0);
+    if (growth.empty()) continue;
+    breaks[body] |= std::any_of(growth.begin() + part.begin, growth.begin() + part.end,
+                                [](double g) { return g > 0; });
+  }
+  return breaks;
+}
+
 std::vector<PhyxelPair> joined_pairs(const Model& model, std::vector<PhyxelPair> here) {
   if (!model.share) return here;
   std::vector<PhyxelPair> all = joined_over_ranks(*model.share->communicator, here);
@@ -168,17 +181,10 @@ PointEnergy PointEnergies::of_row(Index i, const BrokenPairs& broken, const Poin
       visit(x, u[k], weights(row[k], dot(x, x)));
     }
   };
-  NeighbourSums<double> sums;
-  for_each([&](Vec3d x, Vec3d u_ij, double w) { sums.add<true>(x, u_ij, w); });
   const PointConstants<double> constants{model_.volume[i], at.inverse_moment, hourglass_[number],
                                          at.moment_offset, at.closing};
-  const Mat3d fit = displacement_gradient(sums.gradient, at.inverse_moment);
-  const Mat3d grad_u = WithClosing::gradient(fit, sums, constants);
-  const PointResponse<double> response = laws_[number].after_step(grad_u, {}, 0);
-  double residual = 0;
-  for_each([&](Vec3d x, Vec3d u_ij, double w) { add_residual(residual, u_ij, fit, x, w); });
-  return {model_.volume[i] * (response.strain_energy + response.volume_energy),
-          hourglass_energy(hourglass_[number], residual)};
+  return point_energy(for_each, constants,
+                      [&](const Mat3d& grad_u) { return laws_[number].after_step(grad_u, {}, 0); });
 }
 
 }  // namespace phyxel

@@ -11,6 +11,7 @@
 
 #include "exact_sum.hpp"
 #include "model/parts.hpp"
+#include "phyxel/backend.hpp"
 #include "phyxel/model.hpp"
 #include "phyxel/physics/fracture.hpp"
 #include "phyxel/state.hpp"
@@ -72,6 +73,9 @@ class BrokenPairs {
   std::unordered_map<Index, OfPhyxel> broken_;
 };
 
+/// True for the bodies of the scene of which pairs that this rank has may break, shape [bodies].
+std::vector<char> breaking_bodies(const Model& model);
+
 /// The broken pairs of all ranks, ascending. Collective on a share.
 /// @param here those of this rank
 std::vector<PhyxelPair> joined_pairs(const Model& model, std::vector<PhyxelPair> here);
@@ -88,32 +92,47 @@ class CrackFaces {
   void for_each(Index i, const BrokenPairs& broken, DisplacementOf&& displacement,
                 Use&& use) const {
     const std::span<const Index> gone = broken.of(i);
-    const Face own = face_of(i);
     const Vec3d u_i = displacement(i);
     for (const Index j : model_.neighbourhood.neighbours.row(i)) {
       if (!std::binary_search(gone.begin(), gone.end(), j)) continue;
-      const Face other = face_of(j);
       const Vec3d x = model_.position[j] - model_.position[i];
-      const double spacing = std::max(own.spacing, other.spacing);
-      const double stiffness = closed_share * 0.5 * (own.modulus + other.modulus) * spacing;
-      use(ClosedPair{stiffness, std::min(norm(x), spacing)}, x, displacement(j) - u_i);
+      use(closed_pair(modulus_of(i), model_.volume[i], modulus_of(j), model_.volume[j], x), x,
+          displacement(j) - u_i);
     }
+  }
+  /// The energy of the closed cracks of phyxel i [J], likewise.
+  template <class DisplacementOf>
+  double energy(Index i, const BrokenPairs& broken, DisplacementOf&& displacement) const {
+    double energy = 0;
+    for_each(i, broken, displacement,
+             [&](const ClosedPair& pair, Vec3d x, Vec3d u) { energy += pair.energy(x, u); });
+    return energy;
   }
 
  private:
-  /// Constants of a phyxel on the face of a crack.
-  struct Face {
-    double modulus;  // M of pressure waves [Pa]
-    double spacing;  // s [m]
-  };
-  Face face_of(Index i) const {
-    const auto part = static_cast<std::size_t>(&part_of(model_, i) - model_.parts.data());
-    return {moduli_[part], std::cbrt(model_.volume[i])};
+  double modulus_of(Index i) const {
+    return moduli_[static_cast<std::size_t>(&part_of(model_, i) - model_.parts.data())];
   }
 
   const Model& model_;
-  std::vector<double> moduli_;  // of each part
+  std::vector<double> moduli_;  // M of pressure waves of each part [Pa]
 };
+
+/// What broken pairs have left of each phyxel. @param displacement displacement(j) of phyxels of
+/// broken pairs [m]
+template <class DisplacementOf>
+Breakage breakage_of(const Model& model, const BrokenPairs& broken, const CrackFaces& faces,
+                     DisplacementOf&& displacement) {
+  const auto size = static_cast<std::size_t>(model.size());
+  Breakage now{std::vector<double>(size, 0), std::vector<double>(size, 1),
+               std::vector<double>(size, 0)};
+  for (const Index i : broken.phyxels()) {
+    now.broken[i] = broken.share(i);
+    now.carried[i] = broken.of_point(i).carried;
+    now.closed[i] = faces.energy(i, broken, displacement);
+  }
+  return now;
+}
 
 /// The energies of single phyxels.
 class PointEnergies {

@@ -166,16 +166,7 @@ class CpuBackend final : public Backend, private CpuFracture<Real, StateReal> {
 
   std::optional<Breakage> breakage() const override {
     if (!model_.fracture.acts()) return std::nullopt;
-    Breakage now;
-    now.broken.resize(static_cast<std::size_t>(model_.size()), 0);
-    now.carried.resize(static_cast<std::size_t>(model_.size()), 1);
-    now.closed.resize(static_cast<std::size_t>(model_.size()), 0);
-    for (const Index i : this->broken_pairs().phyxels()) {
-      now.broken[i] = this->broken_pairs().share(i);
-      now.carried[i] = this->broken_pairs().of_point(i).carried;
-      now.closed[i] = this->closed_energy(i);
-    }
-    return now;
+    return this->present_breakage();
   }
 
   void update_surfels() override { advect_surfels(moved_surfels_); }

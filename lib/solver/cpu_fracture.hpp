@@ -46,14 +46,7 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
     if (!model.fracture.breaks) return;
     energies_.emplace(model);
     next_look_.assign(static_cast<std::size_t>(layout_.packs()), 0);
-    std::vector<char> breaks;
-    for (const Part& part : model.parts) {
-      const auto body = static_cast<std::size_t>(part.body);
-      breaks.resize(std::max(breaks.size(), body + 1), 0);
-      breaks[body] |= std::any_of(growth.begin() + part.begin, growth.begin() + part.end,
-                                  [](double g) { return g > 0; });
-    }
-    motion_.emplace(model, layout_, lists_, breaks, threads);
+    motion_.emplace(model, layout_, lists_, breaking_bodies(model), threads);
   }
 
  protected:
@@ -101,14 +94,8 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
       this->set3(pull_, slot, pulls ? this->get3(pull_, slot) + force : force);
     }
   }
-  /// The energy of the closed cracks of phyxel i at the present displacements [J].
-  double closed_energy(Index i) const {
-    double energy = 0;
-    faces_->for_each(i, broken_, present(), [&](const ClosedPair& pair, Vec3d x, Vec3d u) {
-      energy += pair.energy(x, u);
-    });
-    return energy;
-  }
+  /// What broken pairs have left of each phyxel at the present displacements.
+  Breakage present_breakage() const { return breakage_of(model_, broken_, *faces_, present()); }
 
   /// Remembers the displacements of a state that has been put in.
   void remember_displacements() {
@@ -259,12 +246,12 @@ class CpuFracture : public CpuPasses<Real, StateReal> {
     if (!inverse_.start.empty()) write_row(inverse_, model_.neighbourhood.inverse().row(i), i);
     PointBreakage has = broken_.of_point(i);
     const PointEnergy after = energies_->of(i, broken_, has, displacement);
-    const double all = had.carried * before.elastic + before.hourglass;
-    has.carried = share_after_break(has.carried, after.elastic, all - after.hourglass);
+    const BreakOfPoint made = break_of_point(had.carried, before, has.carried, after);
+    has.carried = made.carried;
     broken_.set_carried(i, has.carried);
     write_constants(i, has);
-    fracture_energy_.add(all);
-    fracture_energy_.add(-(has.carried * after.elastic + after.hourglass));
+    fracture_energy_.add(made.before);
+    fracture_energy_.add(-made.after);
   }
 
   /// Writes the list of a phyxel without its broken pairs.

@@ -8,18 +8,13 @@
 #include <limits>
 #include <vector>
 
-#include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/pair_motion.hpp"
 #include "solver/cpu_layout.hpp"
 
 namespace phyxel {
 
-/// An upper bound of the change of the lengths of pairs, added up over steps, for blocks of packs.
-///
-/// In a step a phyxel moves by Δu. A part ω × y of it, with y in the middle of the step, turns a
-/// body without changing a length; of two phyxels the rests δ differ by as much as their distance
-/// changes, at most: |d'|² - |d|² = 2 d_mid·(δ_j - δ_i), where d_mid is no longer than the mean of
-/// |d| and |d'|. That holds for any ω; it is chosen for each body so that it turns with it. The δ
-/// of a block and of its neighbours lie in a box, whose diagonal is the bound.
+/// An upper bound of the change of the lengths of pairs, added up over steps, for blocks of packs
+/// (physics/pair_motion.hpp).
 template <class Real>
 class PairMotion {
  public:
@@ -79,7 +74,7 @@ class PairMotion {
       for (Index b = 0; b < blocks; ++b) boxes_[b] = box_of(b, record);
 #pragma omp for schedule(static)
       for (Index b = 0; b < blocks; ++b) {
-        Box around;
+        MotionBox<Real> around;
         for (const Index other : neighbours_[b]) around.add(boxes_[other]);
         apart_[b] += around.diagonal();
       }
@@ -91,32 +86,6 @@ class PairMotion {
  private:
   static constexpr Index block_packs = 8;
   static constexpr int displacement = 4;  // place in a record
-
-  /// The least box that holds some vectors: lower corner with the other sign, upper corner, and the
-  /// largest turning that was taken off, for rounding.
-  struct Box {
-    static constexpr Real none = -std::numeric_limits<Real>::max();
-    Real most[8] = {none, none, none, none, none, none, 0, 0};
-
-    void add(int c, Real value) {
-      most[c] = std::max(most[c], -value);
-      most[3 + c] = std::max(most[3 + c], value);
-    }
-    void add(const Box& other) {
-      for (int k = 0; k < 8; ++k) most[k] = std::max(most[k], other.most[k]);
-    }
-    /// Its diagonal, rounded up [m].
-    double diagonal() const {
-      if (most[0] == none) return 0;
-      double square = 0;
-      for (int c = 0; c < 3; ++c) {
-        const double length = static_cast<double>(most[c]) + static_cast<double>(most[3 + c]);
-        square += length * length;
-      }
-      const double rounding = 16 * std::numeric_limits<Real>::epsilon() * most[6];
-      return (1 + 1e-5) * std::sqrt(square) + rounding;
-    }
-  };
 
   /// Finds the blocks that the pairs of each block reach.
   void find_neighbours(const PackedLists& lists) {
@@ -140,8 +109,8 @@ class PairMotion {
   }
 
   template <class RecordOf>
-  Box box_of(Index b, const RecordOf& record) {
-    Box box;
+  MotionBox<Real> box_of(Index b, const RecordOf& record) {
+    MotionBox<Real> box;
     const auto packs = static_cast<Index>(body_.size());
     for (Index p = b * block_packs; p < std::min(packs, (b + 1) * block_packs); ++p) {
       if (body_[p] < 0) continue;
@@ -153,15 +122,7 @@ class PairMotion {
         const Real* u = x + displacement;
         Real* now = &now_[static_cast<std::size_t>(slot) * 3];
         const Real* old = &before_[static_cast<std::size_t>(slot) * 3];
-        const Vec3<Real> middle{x[0] + Real(0.5) * (old[0] + u[0]),
-                                x[1] + Real(0.5) * (old[1] + u[1]),
-                                x[2] + Real(0.5) * (old[2] + u[2])};
-        const Vec3<Real> turned = cross(omega, middle);
-        box.add(0, u[0] - old[0] - turned.x);
-        box.add(1, u[1] - old[1] - turned.y);
-        box.add(2, u[2] - old[2] - turned.z);
-        box.most[6] =
-            std::max({box.most[6], std::abs(turned.x), std::abs(turned.y), std::abs(turned.z)});
+        box.add(vector(x), vector(old), vector(u), omega);
         std::copy_n(u, 3, now);
       }
     }
@@ -171,43 +132,20 @@ class PairMotion {
   /// Finds how each body has turned in the last step, from some of its phyxels.
   template <class RecordOf>
   void find_turning(const RecordOf& record) {
-    struct Sums {
-      double count = 0;
-      Vec3d place, motion, moment;
-      Sym3d squares;
-    };
-    std::vector<Sums> sums(omega_.size());
+    std::vector<TurningSums> sums(omega_.size());
     constexpr Index samples = 512;
     const auto packs = static_cast<Index>(body_.size());
     for (Index p = 0; p < packs; p += packs / samples + 1) {
       if (body_[p] < 0) continue;
-      Sums& own = sums[static_cast<std::size_t>(body_[p])];
       const Index slot = p * width_;
       const Real* x = record(slot);
-      const Real *u = x + displacement, *old = before(slot);
-      const Vec3d place{x[0] + 0.5 * (old[0] + u[0]), x[1] + 0.5 * (old[1] + u[1]),
-                        x[2] + 0.5 * (old[2] + u[2])};
-      const Vec3d motion{u[0] - old[0], u[1] - old[1], u[2] - old[2]};
-      own.count += 1;
-      own.place += place;
-      own.motion += motion;
-      own.moment += cross(place, motion);
-      own.squares += moment_term(place, 1.0);
+      const Vec3d u = to<double>(vector(x + displacement)), old = to<double>(vector(before(slot)));
+      sums[static_cast<std::size_t>(body_[p])].add(to<double>(vector(x)) + 0.5 * (old + u),
+                                                   u - old);
     }
-    for (std::size_t b = 0; b < sums.size(); ++b) {
-      Sums& own = sums[b];
-      omega_[b] = {};
-      if (own.count < 4) continue;
-      const Vec3d centre = own.place / own.count;
-      own.squares += moment_term(centre, -own.count);
-      const double all = own.squares.xx + own.squares.yy + own.squares.zz;
-      Sym3d inertia = -1.0 * own.squares;
-      inertia.xx += all;
-      inertia.yy += all;
-      inertia.zz += all;
-      omega_[b] = pseudo_inverse(inertia).matrix * (own.moment - cross(centre, own.motion));
-    }
+    for (std::size_t b = 0; b < sums.size(); ++b) omega_[b] = sums[b].turning();
   }
+  static Vec3<Real> vector(const Real* at) { return {at[0], at[1], at[2]}; }
 
   Index width_;
   int threads_;
@@ -216,7 +154,7 @@ class PairMotion {
   AlignedVector<Real> before_, now_;  // displacements at both ends of a step, by slot
   std::vector<Vec3d> omega_;  // turning in the next step of each body, guessed from the last
   std::vector<std::vector<Index>> neighbours_;  // of each block, by number, itself included
-  std::vector<Box> boxes_;                      // of each block
+  std::vector<MotionBox<Real>> boxes_;          // of each block
   std::vector<double> apart_;                   // likewise
 };
 

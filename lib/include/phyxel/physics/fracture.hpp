@@ -13,7 +13,10 @@
 /// Ganzenmüller 2015 (pairs of a corrected SPH that break).
 #pragma once
 
+#include <cmath>
+
 #include "phyxel/physics/moment.hpp"
+#include "phyxel/physics/point.hpp"
 #include "phyxel/types.hpp"
 
 namespace phyxel {
@@ -108,6 +111,20 @@ struct ClosedPair {
   }
 };
 
+/// The closed pair of two phyxels that have broken from each other.
+/// @param modulus_i,modulus_j M of pressure waves in the material of each [Pa]
+/// @param volume_i,volume_j their volumes when whole [m³]. @param x leads from one to the other at
+/// rest [m]
+PHYXEL_HD ClosedPair closed_pair(double modulus_i, double volume_i, double modulus_j,
+                                 double volume_j, Vec3<double> x) {
+  using std::cbrt;
+  using std::sqrt;
+  const double spacing_i = cbrt(volume_i), spacing_j = cbrt(volume_j), apart = sqrt(dot(x, x));
+  const double spacing = spacing_i < spacing_j ? spacing_j : spacing_i;
+  return {closed_share * 0.5 * (modulus_i + modulus_j) * spacing,
+          spacing < apart ? spacing : apart};
+}
+
 /// The energy by which the forces of a phyxel follow from displacements.
 struct PointEnergy {
   double elastic = 0;    ///< Of its whole volume [J].
@@ -125,6 +142,45 @@ PHYXEL_HD double share_after_break(double share, double elastic, double availabl
   if (share * elastic <= available) return share;
   const double left = available / elastic;
   return left > 0 ? left : 0;
+}
+
+/// What breaking has made of the energy of a phyxel.
+struct BreakOfPoint {
+  double carried = 1;  ///< The share of its volume with which it carries stress now.
+  double before = 0;   ///< Its energy before [J].
+  double after = 0;    ///< Its energy after [J].
+};
+
+/// The energies of a phyxel before and after it has lost pairs at displacements that do not change.
+/// @param had the share of its volume with which it carried stress. @param before its energy with
+/// the pairs that it had. @param most `carried_share` of the pairs that are left. @param after its
+/// energy with these
+PHYXEL_HD BreakOfPoint break_of_point(double had, const PointEnergy& before, double most,
+                                      const PointEnergy& after) {
+  BreakOfPoint result;
+  result.before = had * before.elastic + before.hourglass;
+  result.carried =
+      share_after_break(most < had ? most : had, after.elastic, result.before - after.hourglass);
+  result.after = result.carried * after.elastic + after.hourglass;
+  return result;
+}
+
+/// The energy of a phyxel of an elastic law, hourglass control included.
+/// @param for_each for_each(visit) calls visit(x, u, w) for the neighbours that the phyxel is bound
+/// to, with x_ij [m], u_ij [m] and w_ij
+/// @param point its constants, with its whole volume. @param response_of response_of(∇u) is the
+/// `PointResponse` of its material
+template <class ForEach, class ResponseOf>
+PHYXEL_HD PointEnergy point_energy(const ForEach& for_each, const PointConstants<double>& point,
+                                   const ResponseOf& response_of) {
+  NeighbourSums<double> sums;
+  for_each([&](Vec3<double> x, Vec3<double> u, double w) { sums.template add<true>(x, u, w); });
+  const Mat3<double> fit = displacement_gradient(sums.gradient, point.inverse_moment);
+  const auto response = response_of(WithClosing::gradient(fit, sums, point));
+  double residual = 0;
+  for_each([&](Vec3<double> x, Vec3<double> u, double w) { add_residual(residual, u, fit, x, w); });
+  return {point.volume * (response.strain_energy + response.volume_energy),
+          hourglass_energy(point.hourglass, residual)};
 }
 
 }  // namespace phyxel
