@@ -23,9 +23,6 @@ std::unique_ptr<Backend> make_cuda_backend(const Model& model, Precision precisi
   if (model.share && model.share->place.size() != static_cast<std::size_t>(model.size())) {
     throw InputError("the GPU backend needs shares that are cut between tiles");
   }
-  if (model.fracture.acts()) {
-    throw InputError("body.fracture and body.notch cannot run on a GPU yet: allowed is the CPU");
-  }
   for (const Part& part : model.parts) {
     if (!part.material.custom_law) continue;
     throw InputError("body \"" + part.name + "\": custom_law = \"" +

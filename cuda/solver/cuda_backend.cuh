@@ -29,7 +29,8 @@ class CudaBackend final : public Backend {
         boundary_(m_),
         contacts_(m_),
         body_contacts_(m_),
-        passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get())),
+        fracture_(m_),
+        passes_(std::make_unique<Passes<Real, StateReal>>(m_, halo_.get(), fracture_)),
         path_(choose_path(m_, halo_.get(), boundary_, contacts_, path)),
         has_surfels_(!model.surfels.position.empty()) {
     if (m_.share()) has_surfels_ = m_.share()->communicator->largest(has_surfels_) > 0;
@@ -54,7 +55,9 @@ class CudaBackend final : public Backend {
 
   void put(const State& state) override {
     leave_steps();
+    fracture_.put(state);
     m_.put(state);
+    fracture_.remember_displacements();
     contacts_.put_rigid(state.rigid, state.dt);
     history_interval_ = state.history.empty() ? 0 : state.history_interval;
   }
@@ -65,6 +68,9 @@ class CudaBackend final : public Backend {
     m_.take(state);
     state.history_interval = m_.has_history() ? history_interval_ : 0;
     state.rigid = contacts_.rigid_states();
+    const BrokenPairs broken = fracture_.broken();
+    state.broken = broken.pairs();
+    state.worn = broken.worn();
   }
 
   void set_external_forces(std::span<const Vec3d> force) override {
@@ -84,7 +90,7 @@ class CudaBackend final : public Backend {
     boundary_.set_external(values);
     if (had_loads == static_cast<bool>(m_.fields().load)) return;
     // The choice of kernels depends on whether there are applied forces.
-    passes_ = std::make_unique<Passes<Real, StateReal>>(m_, halo_.get());
+    passes_ = std::make_unique<Passes<Real, StateReal>>(m_, halo_.get(), fracture_);
     for (StepGraph& graph : graphs_) graph.forget();
   }
   std::span<const Vec3d> external_forces() const override { return external_force_; }
@@ -96,6 +102,7 @@ class CudaBackend final : public Backend {
         move_surfels && has_surfels_ ? &surfels_of_model() : nullptr;
     while (count > 0) {
       contacts_.prepare(dt, steps_together);
+      fracture_.prepare(steps_together);
       const int launched = launch_steps(static_cast<double>(first) * dt, count, surfels);
       bound_queue(launched);
       if (halo_) halo_->count_steps(launched);
@@ -105,8 +112,10 @@ class CudaBackend final : public Backend {
   }
   std::vector<std::int64_t> step_sums() const override {
     m_.use_device();
-    return words_of(
-        joined(joined(boundary_.support_work(), contacts_.sums()), body_contacts_.sums()));
+    StepSums sums =
+        joined(joined(boundary_.support_work(), contacts_.sums()), body_contacts_.sums());
+    if (fracture_.may_break()) sums.resize(sums_before_fracture(m_.model()));
+    return words_of(joined(std::move(sums), fracture_.taken()));
   }
   std::optional<NextContacts> next_contacts(double time, double dt) override {
     if (!contacts_.acts() && !body_contacts_.acts()) return std::nullopt;
@@ -156,6 +165,15 @@ class CudaBackend final : public Backend {
   }
   void set_history_interval(double interval) override { history_interval_ = interval; }
   void commit_history() override {
+    if (fracture_.may_break()) {
+      m_.use_device();
+      passes_->receive_displacements();
+      fracture_.prepare(1);
+      fracture_.break_pairs(false);
+      m_.wait();
+      // Another rank's next stresses differ, and must not arrive before all ranks have read these.
+      if (m_.share()) m_.share()->communicator->largest(0);
+    }
     if (!m_.has_history()) return;  // the same on all ranks
     m_.use_device();
     passes_->commit(history_interval_);
@@ -264,6 +282,13 @@ class CudaBackend final : public Backend {
     }
   }
 
+  std::optional<Breakage> breakage() const override {
+    if (!fracture_.acts()) return std::nullopt;
+    m_.use_device();
+    passes_->receive_displacements();
+    return fracture_.breakage();
+  }
+
   std::unique_ptr<Vibration> vibration() override {
     m_.use_device();
     passes_->receive_displacements();
@@ -278,6 +303,9 @@ class CudaBackend final : public Backend {
   void update_surfels() override {
     if (!has_surfels_) return;
     m_.use_device();
+    if (fracture_.acts()) {
+      surfels_of_model().cut({m_.model(), joined_pairs(m_.model(), fracture_.broken().pairs())});
+    }
     surfels_of_model().launch(*passes_);
   }
   void advect_surfels(SurfelState& out) override {
@@ -302,6 +330,7 @@ class CudaBackend final : public Backend {
     if (const std::size_t bytes = contacts_.bytes() + body_contacts_.bytes(); bytes > 0) {
       list.push_back({"contact", bytes});
     }
+    if (fracture_.acts()) list.push_back({"fracture", fracture_.bytes()});
     if (boundary_.work_bytes() > 0) list.push_back({"work of supports", boundary_.work_bytes()});
     if (surfels_) list.push_back({"surfels", surfels_->bytes()});
     if (halo_) list.push_back({"exchange", halo_->bytes()});
@@ -349,7 +378,7 @@ class CudaBackend final : public Backend {
       return steps;
     }
     if (alike && left >= steps_together && graph_serves(surfels)) {
-      graphs_[surfels != nullptr].launch(m_.stream(), [&] {
+      graphs_[2 * fracture_.parity() + (surfels != nullptr)].launch(m_.stream(), [&] {
         for (int s = 0; s < steps_together; ++s) launch_step(time, surfels, s > 0);
       });
       return steps_together;
@@ -380,6 +409,10 @@ class CudaBackend final : public Backend {
       passes_->advance_and_send(m_.dt());
     }
     fresh_ = false;
+    if (fracture_.may_break()) {
+      passes_->receive_displacements();
+      fracture_.break_pairs(true);
+    }
     if (surfels) surfels->launch(*passes_);
   }
   /// Sums the loads of a step from a time [s].
@@ -436,6 +469,7 @@ class CudaBackend final : public Backend {
   Boundary<Real, StateReal> boundary_;
   Contacts<Real, StateReal> contacts_;
   DeviceBodyContacts<Real, StateReal> body_contacts_;
+  DeviceFracture<Real, StateReal> fracture_;
   std::unique_ptr<Passes<Real, StateReal>> passes_;
   LaunchPath<Real, StateReal> path_;
   std::vector<Vec3d> external_force_;
@@ -443,7 +477,7 @@ class CudaBackend final : public Backend {
   bool has_surfels_;                        // on any rank
   bool fresh_ = true;                       // true if no step has been taken since the last upload
   double history_interval_ = 0;             // time from the histories to the displacements [s]
-  StepGraph graphs_[2];                     // without surfels, and with surfels
+  StepGraph graphs_[4];                     // without and with surfels, by `DeviceFracture::parity`
   DeviceArray<Real> stiffening_gradients_;  // of small bodies, created by the first look
   DeviceArray<TileStiffening> stiffest_;    // per tile, likewise
   Event marks_[2];

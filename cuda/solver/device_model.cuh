@@ -356,7 +356,7 @@ class DeviceModel {
     if (own_supports_) supports_ = {places(), "supports" + of};
     velocity_ = {3 * places(), "velocities" + of};
     if (mixed) displacement_ = {3 * places(), "displacements" + of};
-    if (has_hourglass_control(model_)) {
+    if (has_hourglass_control(model_) || model_.fracture.acts()) {
       pull_ = {3 * places(), "hourglass control" + of};
       pull_.clear();
     }

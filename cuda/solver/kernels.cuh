@@ -54,11 +54,11 @@ struct Fields {
   /// 1/h² [1/m²], or `relative_half_support` in bodies with weights of pairs, [places]; null if
   /// each body has one support.
   const Real* inverse_h_squared;
-  const Real* moment_constants;  ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
-  const Real* force_constants;   ///< b and 1/m, shape [4, places]; -1/m if fixed, 0 if empty.
-  const Real* load;              ///< Applied forces, [3, places], or null.
-  Real* pull;                    ///< Force of hourglass control, [3, places], or null.
-  const Real* closing;           ///< ĉ of closed gradients [1/m]: [3, places], or null.
+  Real* moment_constants;  ///< A⁻¹ (xx, xy, xz, yy, yz, zz) and v, shape [7, places].
+  Real* force_constants;   ///< b and 1/m, shape [4, places]; -1/m if fixed, 0 if empty.
+  const Real* load;        ///< Applied forces, [3, places], or null.
+  Real* pull;              ///< Force of hourglass control and closed cracks, [3, places], or null.
+  Real* closing;           ///< ĉ of closed gradients [1/m]: [3, places], or null.
   ClosingStresses<Real> closing_stresses;
   StateReal* velocity;      ///< [3, places]
   StateReal* displacement;  ///< [3, places] if StateReal is not Real, else null.

@@ -43,6 +43,8 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
     launches = "obstacles move from step to step";
   } else if (model.model().body_contact.acts()) {
     launches = "points that may touch change from step to step";
+  } else if (model.model().fracture.acts() && model.share()) {
+    launches = "ghosts are received before pairs are looked at after each step";
   } else if (contacts.acts() && model.share()) {
     launches = "phyxels are kept out of obstacles before they are sent";
   } else if (model.size() > most_recorded) {
@@ -58,7 +60,9 @@ LaunchPath<Real, StateReal> choose_path(const DeviceModel<Real, StateReal>& mode
                                      : launches;
     return path;
   }
-  if (wanted == CudaPath::automatic && model.model().body_contact.acts()) {
+  if (wanted == CudaPath::automatic && model.model().fracture.acts()) {
+    path.reason = "pairs that break are looked for after each step";
+  } else if (wanted == CudaPath::automatic && model.model().body_contact.acts()) {
     path.reason = "bodies that touch each other are kept apart after each step";
   } else if (wanted == CudaPath::automatic && contacts.acts()) {
     path.reason = "phyxels are kept out of obstacles after each step";

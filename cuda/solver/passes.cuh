@@ -2,6 +2,7 @@
 /// and the halo exchanges of a share.
 #pragma once
 
+#include "solver/device_fracture.cuh"
 #include "solver/device_halo.cuh"
 
 namespace phyxel::cuda {
@@ -18,10 +19,12 @@ class Passes {
   using Fused2 = FusedHalo<Points<Real>>;
 
  public:
-  /// @param halo halo of a share, or null
-  Passes(const DeviceModel<Real, StateReal>& model, const DeviceHalo<Real, StateReal>* halo)
+  /// @param halo halo of a share, or null. @param fracture must outlive this
+  Passes(const DeviceModel<Real, StateReal>& model, const DeviceHalo<Real, StateReal>* halo,
+         const DeviceFracture<Real, StateReal>& fracture)
       : m_(model),
         halo_(halo),
+        fracture_(fracture),
         direct_(halo ? halo->fused() : nullptr),
         interior_(m_.boundary_tiles(), m_.tiles(), *this),
         boundary_(0, m_.boundary_tiles(), *this),
@@ -31,27 +34,20 @@ class Passes {
                                      [&](const Part& part) { return linear_pass_1_of(part); });
   }
 
-  /// Launches pass 1. Interior tiles, which need no ghosts, are launched before the wait for
-  /// ghosts.
+  /// Launches pass 1, and adds the forces of closed cracks. Interior tiles, which need no ghosts,
+  /// are launched before the wait for ghosts, unless there may be cracks.
   /// @param use treatment of histories. @param interval time from the histories to the present
   /// displacements [s]
   void stress(HistoryUse use, double interval) const {
     AllFields fields = m_.fields();
     fields.history_use = use;
     fields.history_interval = static_cast<Real>(interval);
-    if (direct_) {
-      const bool waits = halo_->begin_fused_pass(Sent::displacements, Sent::stresses);
-      if (m_.closed()) {
-        fused_closed_.stress(fields, direct_->template of_pass_1<ClosedStresses<Real>>(waits));
-      } else {
-        fused_.stress(fields, direct_->template of_pass_1<Stresses<Real>>(waits));
-      }
-      return;
-    }
-    interior_.stress(fields, {});
+    if (!fracture_.acts()) return launch_stress(fields);
+    // Once stresses are sent, other ranks may send the next displacements of ghosts.
     receive(Sent::displacements);
-    boundary_.stress(fields, {});
-    send(Sent::stresses);
+    fracture_.find_closed();
+    launch_stress(fields);
+    fracture_.add_closed();
   }
   /// Launches pass 2. Displacements may still change before they are sent to other ranks
   /// (`send_displacements`).
@@ -177,6 +173,23 @@ class Passes {
     std::vector<Run<Pass2<Halo2>>> pass_2;
   };
 
+  /// Launches pass 1 alone.
+  void launch_stress(const AllFields& fields) const {
+    if (direct_) {
+      const bool waits = halo_->begin_fused_pass(Sent::displacements, Sent::stresses);
+      if (m_.closed()) {
+        fused_closed_.stress(fields, direct_->template of_pass_1<ClosedStresses<Real>>(waits));
+      } else {
+        fused_.stress(fields, direct_->template of_pass_1<Stresses<Real>>(waits));
+      }
+      return;
+    }
+    interior_.stress(fields, {});
+    receive(Sent::displacements);
+    boundary_.stress(fields, {});
+    send(Sent::stresses);
+  }
+
   void send(Sent what) const {
     if (halo_) halo_->begin(what);
   }
@@ -295,6 +308,7 @@ class Passes {
 
   const DeviceModel<Real, StateReal>& m_;
   const DeviceHalo<Real, StateReal>* halo_;
+  const DeviceFracture<Real, StateReal>& fracture_;
   const DirectExchange<Real, StateReal>* direct_;
   Runs<NoHalo, NoHalo> interior_, boundary_;
   std::vector<Run<Pass1<NoHalo>>> linear_;  // all tiles, by the laws at rest

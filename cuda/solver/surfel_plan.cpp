@@ -42,8 +42,8 @@ Taken take_surfels(const Model& model, const std::vector<Index>& place,
   return {std::move(sorted), next};
 }
 
-void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place, Index first,
-               const Taken& taken) {
+void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& place,
+               const CrackSides& sides, Index first, const Taken& taken) {
   const Csr& carriers = model.surfels.carriers;
   const std::vector<Index>& phyxels = taken.phyxels;
   const std::vector<Index>& whole = order_of(model, place);
@@ -70,7 +70,7 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
                        static_cast<std::size_t>(block.carriers) * surfel_block);
   for (int s = 0; s < block.surfels; ++s) {
     const auto row = carriers.row(surfel(s));
-    const std::vector<double> weights = carrier_weights(model, surfel(s));
+    const std::vector<double> weights = carrier_weights(model, surfel(s), sides);
     std::vector<Carrier> own;
     for (std::size_t k = 0; k < row.size(); ++k) {
       const auto at = std::lower_bound(phyxels.begin(), phyxels.end(), row[k],
@@ -89,7 +89,8 @@ void add_block(SurfelPlan& plan, const Model& model, const std::vector<Index>& p
 
 }  // namespace
 
-SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place) {
+SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place,
+                            const CrackSides& sides) {
   const Surfels& surfels = model.surfels;
   // A block takes surfels of one tile, that of their first carrier. The rank that owns the tile has
   // all its surfels, and makes the same blocks as a single rank.
@@ -111,7 +112,7 @@ SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place)
     }
     for (Index first = begin; first < end;) {
       const Taken taken = take_surfels(model, place, plan.order, first, end);
-      add_block(plan, model, place, first, taken);
+      add_block(plan, model, place, sides, first, taken);
       first = taken.next;
     }
   }

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "setup/tiling.hpp"
+#include "solver/crack_sides.hpp"
 
 namespace phyxel::cuda {
 
@@ -42,7 +43,9 @@ struct SurfelPlan {
 };
 
 /// Makes the plan. On a share, blocks equal those of the whole model, in surfels and carriers.
-/// @param place tile slot of each phyxel, as in `Tiling`
-SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place);
+/// @param place tile slot of each phyxel, as in `Tiling`. @param sides carriers on the other side
+/// of a crack have weight zero; nothing else depends on them
+SurfelPlan make_surfel_plan(const Model& model, const std::vector<Index>& place,
+                            const CrackSides& sides = {});
 
 }  // namespace phyxel::cuda

@@ -172,6 +172,13 @@ class SurfelAdvection {
       out.normal[s] = normalised(to<double>(normal[k]));
     }
   }
+  /// Takes the carriers on the other sides of cracks from surfels, and gives back those that it
+  /// took before from others. Steps must not be in progress.
+  void cut(CrackSides sides) {
+    if (sides.broken() == sides_.broken()) return;
+    sides_ = std::move(sides);
+    carriers_.upload(carriers_of(make_surfel_plan(m_.model(), m_.tiling().place, sides_)).data());
+  }
   std::size_t bytes() const {
     return blocks_.bytes() + place_.bytes() + row_.bytes() + tiles_.bytes() + carriers_.bytes() +
            position_.bytes() + normal_.bytes() + displacement_.bytes() + moved_normal_.bytes() +
@@ -221,11 +228,7 @@ class SurfelAdvection {
     }
     const auto steps = static_cast<std::size_t>(std::max(1, trail_steps));
     gradients_ = {steps * 9 * stride_, what};
-    std::vector<DeviceCarrier<Real>> carriers;
-    for (const Carrier& c : plan.carriers) {
-      carriers.push_back({static_cast<Real>(c.weight), 16U * static_cast<unsigned>(c.slot)});
-    }
-    carriers_ = sent(carriers, what);
+    carriers_ = sent(carriers_of(plan), what);
     position_ = sent(position, what);
     normal_ = sent(normal, what);
     displacement_ = {steps * order_.size(), what};
@@ -244,6 +247,13 @@ class SurfelAdvection {
                          order_.size(), most_slots_});
   }
 
+  static std::vector<DeviceCarrier<Real>> carriers_of(const SurfelPlan& plan) {
+    std::vector<DeviceCarrier<Real>> carriers;
+    for (const Carrier& c : plan.carriers) {
+      carriers.push_back({static_cast<Real>(c.weight), 16U * static_cast<unsigned>(c.slot)});
+    }
+    return carriers;
+  }
   /// Returns the index of each slot among the slots of tiles with carriers.
   static std::vector<Index> rows_of(const SurfelPlan& plan) {
     std::vector<Index> rows;
@@ -257,6 +267,7 @@ class SurfelAdvection {
 
   const DeviceModel<Real, StateReal>& m_;
   std::vector<Index> order_;
+  CrackSides sides_;  // of the cracks by which carriers were cut
   int most_slots_ = 0, shared_bytes_ = 0;
   std::size_t stride_ = 0;
   mutable std::size_t last_steps_ = 1;  // steps of the last launch

@@ -66,7 +66,8 @@ bool needs_lists_on_host(const BodyRequest& request) {
   const bool may_have_spacing = request.source.grading || !request.source.cloud.empty() ||
                                 (!request.source.file.empty() && has_spacing(request.source.file));
   const bool pairwise = rule.resolved(may_have_spacing).pairwise();
-  return !request.inclusions.empty() || !request.notches.empty() || may_be_cut || pairwise;
+  const bool breaks = request.fracture.has_value() || !request.notches.empty();
+  return !request.inclusions.empty() || breaks || may_be_cut || pairwise;
 }
 
 bool needs_lists_on_host(const BodyRequest& request, const Cloud& cloud) {

@@ -85,11 +85,11 @@ void check_surveyable(const BodyRequest& request, const Cloud& cloud, bool kerne
         "in lists of neighbours on the host: allowed is a model built without a surveyor",
         request.where, request.name));
   }
-  if (!request.notches.empty()) {
+  if (request.fracture || !request.notches.empty()) {
     throw InputError(fmt::format(
-        "{}: body \"{}\" has notches, which cut pairs in lists of neighbours on the host: allowed "
+        "{}: body \"{}\" has {}, by which pairs break in lists of neighbours on the host: allowed "
         "is a model built without a surveyor",
-        request.where, request.name));
+        request.where, request.name, request.fracture ? "fracture" : "notches"));
   }
   if (!request.inclusions.empty()) {
     refuse_inclusions(request, "which are numbered on the host",

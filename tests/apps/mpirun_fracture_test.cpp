@@ -4,6 +4,7 @@
 
 #include <filesystem>
 
+#include "device.hpp"
 #include "mpirun.hpp"
 #include "phyxel/checkpoint.hpp"
 #include "phyxel/recorder.hpp"
@@ -71,6 +72,36 @@ TEST_F(BreakingPlate, BreaksTheSameOnAllRanksAndThreads) {
       ASSERT_EQ(outcome.code, 0) << outcome.err;
       expect_same_files("alone", name);
     }
+  }
+}
+
+/// Ranks share a GPU, if there is one alone; each transport brings the displacements of ghosts to
+/// the look at pairs after each step.
+TEST_F(BreakingPlate, BreaksTheSameOnGpusOfAnyNumberOfRanks) {
+  if (cuda_devices().empty()) GTEST_SKIP() << "no CUDA device";
+  for (const std::string precision : {"float", "double"}) {
+    write_plate(precision);
+    const auto on = [&](int ranks, const std::string& out, std::vector<std::string> more) {
+      std::vector<std::string> words{"run", "scene.toml", "--device", "cuda", "--out", out};
+      words.insert(words.end(), more.begin(), more.end());
+      return run_on(ranks, words);
+    };
+    const Outcome alone = on(0, "alone", {"--force"});
+    ASSERT_EQ(alone.code, 0) << alone.err;
+    EXPECT_GT(last_energy("alone", "fracture_energy"), 0.1 * 50 * 0.5 * 0.12);
+    keep_last_checkpoint("alone");
+    for (const std::string transport : {"direct", "host"}) {
+      const Outcome outcome = on(2, transport, {"--force", "--transport", transport});
+      ASSERT_EQ(outcome.code, 0) << outcome.err;
+      keep_last_checkpoint(transport);
+      expect_same_files("alone", transport);
+    }
+    // The crack runs at this time.
+    ASSERT_EQ(on(2, "resumed", {"--force", "--until", "0.028"}).code, 0);
+    const Outcome resumed = on(0, "resumed", {"--resume", "auto"});
+    ASSERT_EQ(resumed.code, 0) << resumed.err;
+    keep_last_checkpoint("resumed");
+    expect_same_files("alone", "resumed");
   }
 }
 

@@ -341,10 +341,12 @@ TEST(Fracture, CostsNothingWhereNothingBreaks) {
   for (const ArrayBytes& array : a->memory()) EXPECT_NE(array.name, "fracture");
   EXPECT_TRUE(one.step_sums().empty());
   EXPECT_FALSE(a->breakage().has_value());
+#if !defined(PHYXEL_TEST_CUDA)  // a GPU has a second copy of its lists
   // Displacements at both ends of a step and the index of the phyxel of each slot, of which there
   // are as many as phyxels and a pack more, and two numbers of each pack of four lanes or more.
   const std::size_t slots = static_cast<std::size_t>(plain.size()) + 16;
   EXPECT_LE(memory_of(*b), memory_of(*a) + slots * (6 * 4 + 4) + slots / 4 * (8 + 4));
+#endif
   one.step(300);
   other.step(300);
   EXPECT_EQ(one.state().displacement, other.state().displacement);
