@@ -58,8 +58,8 @@ TEST(CudaFracture, BreaksThePairsOfTheCpu) {
   EXPECT_EQ(found.broken, expected.broken);
 }
 
-/// In float the pieces are others in detail, and alike on the whole: seen on the CPU, the pairs
-/// that break in float and double differ by a few in a hundred.
+/// In float the pieces are others in detail, and alike on the whole: a twentieth is an estimate of
+/// how far counts of some hundred pairs differ between runs that part by rounding.
 TEST(CudaFracture, FloatBreaksAsMuchAsDouble) {
   TornBar bar;
   Run exact(bar, make_cpu_backend(bar.model, Precision::double_));
