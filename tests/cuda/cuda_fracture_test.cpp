@@ -11,8 +11,8 @@ namespace {
 using namespace phyxel::testing;
 
 /// A solver of the torn bar's model on another backend, from its first state.
-struct Run {
-  Run(TornBar& bar, std::unique_ptr<Backend> on) : backend(std::move(on)), model(bar.model) {
+struct TornRun {
+  TornRun(TornBar& bar, std::unique_ptr<Backend> on) : backend(std::move(on)), model(bar.model) {
     solver = std::make_unique<Solver>(model, *backend, bar.solver->state(), Method::verlet);
   }
   double fracture_energy() { return diagnose(model, *backend, *solver).fracture_energy; }
@@ -27,7 +27,7 @@ struct Run {
 /// it came so near the critical stretch.
 TEST(CudaFracture, BreaksThePairsOfTheCpu) {
   TornBar bar;  // on the GPU
-  Run gpu(bar, make_cuda_backend(bar.model, Precision::double_)),
+  TornRun gpu(bar, make_cuda_backend(bar.model, Precision::double_)),
       cpu(bar, make_cpu_backend(bar.model, Precision::double_));
   for (int k = 0; k < 8; ++k) {
     gpu.solver->step(50);
@@ -62,12 +62,12 @@ TEST(CudaFracture, BreaksThePairsOfTheCpu) {
 /// how far counts of some hundred pairs differ between runs that part by rounding.
 TEST(CudaFracture, FloatBreaksAsMuchAsDouble) {
   TornBar bar;
-  Run exact(bar, make_cpu_backend(bar.model, Precision::double_));
+  TornRun exact(bar, make_cpu_backend(bar.model, Precision::double_));
   exact.solver->step(400);
   const double pairs = static_cast<double>(exact.solver->state().broken.size()),
                taken = exact.fracture_energy();
   for (const Precision precision : {Precision::single, Precision::mixed}) {
-    Run gpu(bar, make_cuda_backend(bar.model, precision));
+    TornRun gpu(bar, make_cuda_backend(bar.model, precision));
     gpu.solver->step(400);
     EXPECT_NEAR(static_cast<double>(gpu.solver->state().broken.size()), pairs, 0.05 * pairs);
     EXPECT_NEAR(gpu.fracture_energy(), taken, 0.05 * taken);
@@ -79,7 +79,7 @@ TEST(CudaFracture, FloatBreaksAsMuchAsDouble) {
 TEST(CudaFracture, HasTheSameBitsByGraphs) {
   for (const Precision precision : {Precision::single, Precision::double_}) {
     TornBar bar(precision);
-    Run recorded(bar, make_cuda_backend(bar.model, precision)),
+    TornRun recorded(bar, make_cuda_backend(bar.model, precision)),
         launched(bar, make_cuda_backend(bar.model, precision, 0, CudaPath::launches)),
         divided(bar, make_cuda_backend(bar.model, precision));
     EXPECT_NE(recorded.backend->name().find("graphs of 16 steps"), std::string::npos)
@@ -89,7 +89,7 @@ TEST(CudaFracture, HasTheSameBitsByGraphs) {
     for (const int steps : {1, 40, 3, 33, 100, 123}) divided.solver->step(steps);
     const State expected = launched.solver->state();
     EXPECT_GT(expected.broken.size(), 100u);
-    for (Run* run : {&recorded, &divided}) {
+    for (TornRun* run : {&recorded, &divided}) {
       const State found = run->solver->state();
       EXPECT_EQ(found.broken, expected.broken);
       EXPECT_EQ(found.worn, expected.worn);
