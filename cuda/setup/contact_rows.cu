@@ -255,8 +255,7 @@ DeviceArray<std::uint64_t> entries_among(const Candidates& points, const LayerVi
              body[p] = points[p].body;
              order[by_list[p]] = static_cast<Index>(p);
            });
-  // Points of fast bodies look at more rings of cells than all others.
-  const DeviceHash hash(now, extent.box, extent.range + layer.least_skin);
+  const DeviceHash hash(now, extent.box, extent.range + layer.most_skin);
   const Near near{layer, hash.view(), points.data(), body.data(), extent.range};
   if (room == 0) room = n;
   DeviceArray<std::uint64_t> keys;

@@ -24,7 +24,7 @@ struct LayerView {
   const Index* partner;
   const ContactLaw* law;  ///< Of partners.
   const double* skins;    ///< Of bodies [m].
-  double least_skin;      ///< The smallest one [m].
+  double most_skin;       ///< The largest one [m].
   int rank;
 
   /// The number of a body among the partners of all; -1 if two do not touch.

@@ -81,32 +81,15 @@ struct HashView {
       if (thread == 0) visit_all(body, visit);
       return;
     }
-    const CellGrid& grid = bodies[body].grid;
-    const CellGrid::Cell c = grid.cell_of(place);
+    const CellGrid::Cell c = bodies[body].grid.cell_of(place);
     int number = 0;
     for (std::int64_t z = c.z - rings; z <= c.z + rings; ++z) {
       for (std::int64_t y = c.y - rings; y <= c.y + rings; ++y) {
         for (std::int64_t x = c.x - rings; x <= c.x + rings; ++x) {
-          const CellGrid::Cell cell{x, y, z};
-          if (rings > 1 && is_beyond(grid, cell, place, reach)) continue;
-          if (number++ % threads == thread) visit_cell(body, cell, visit);
+          if (number++ % threads == thread) visit_cell(body, {x, y, z}, visit);
         }
       }
     }
-  }
-  /// True if all of a cell is farther from a place than `reach`.
-  static __device__ bool is_beyond(const CellGrid& grid, CellGrid::Cell cell, Vec3d place,
-                                   double reach) {
-    const Vec3d in_cells = grid.inverse_cell_size * (place - grid.low);
-    const auto apart = [](double at, std::int64_t begin) {
-      const double low = static_cast<double>(begin) - at;
-      return fmax(fmax(low, -1 - low), 0.0);
-    };
-    const Vec3d way{apart(in_cells.x, cell.x), apart(in_cells.y, cell.y),
-                    apart(in_cells.z, cell.z)};
-    constexpr double rounding = 1 + 1e-6;
-    const double most = rounding * (reach * grid.inverse_cell_size + cell_rounding);
-    return dot(way, way) > most * most;
   }
   __device__ bool is_of(int body, std::uint32_t k) const {
     return index[k] >= bodies[body].begin && index[k] < bodies[body].end;

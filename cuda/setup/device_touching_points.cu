@@ -267,7 +267,7 @@ void DeviceTouchingPoints::send_reach(const std::vector<double>& skins) {
   send(sent_skin_, skins, skin_);
 }
 
-LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double least_skin) const {
+LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double most_skin) const {
   const Share* const share = layer_.model().share.get();
   return {position.data(),
           site_.data(),
@@ -279,7 +279,7 @@ LayerView DeviceTouchingPoints::view(const DeviceArray<Vec3d>& position, double 
           partner_.data(),
           partner_law_.data(),
           skin_.data(),
-          least_skin,
+          most_skin,
           share ? share->communicator->rank() : 0};
 }
 
@@ -295,7 +295,7 @@ void DeviceTouchingPoints::find(const DeviceArray<Vec3d>& position, double dt,
   reach_ = layer_.reach_of(boxes_of_groups(position), skins, near_bodies_);
   send_reach(skins);
   const Model& model = layer_.model();
-  const LayerView layer = view(position, *std::ranges::min_element(skins));
+  const LayerView layer = view(position, *std::ranges::max_element(skins));
   Phase part("points near other bodies");
   facts_.clear();
   Candidates points = candidates_of(layer, position.size(), facts_);

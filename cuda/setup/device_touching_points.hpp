@@ -83,7 +83,7 @@ class DeviceTouchingPoints {
  private:
   std::span<const Box> boxes_of_groups(const DeviceArray<Vec3d>& position);
   void send_reach(const std::vector<double>& skins);
-  LayerView view(const DeviceArray<Vec3d>& position, double least_skin) const;
+  LayerView view(const DeviceArray<Vec3d>& position, double most_skin) const;
   /// Sets points and lists. @param chosen flags of the candidates that are points
   void set_points(const DeviceArray<ContactCandidate>& points, const DeviceArray<char>& chosen,
                   FoundRows found, int rank);

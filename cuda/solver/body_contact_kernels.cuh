@@ -109,14 +109,12 @@ __global__ void begin_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, P
   const int p = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   if (p == 0) add_way(*way);
   if (p >= s.count) return;
-  SurfaceMotion motion;  // written as a whole: words of one phyxel lie together
-  motion.after = s.motion[p].after;
+  SurfaceMotion& motion = s.motion[p];
   motion.before = s.position[p] + displacement_at(f, s.place[p]);
   motion.earlier = to<double>(column3(f.velocity, f.places, s.place[p]));
   Mat3<double> gradient;
   for (int e = 0; e < 9; ++e) gradient(e / 3, e % 3) = s.gradients[e * s.stride + s.entry[p]];
   set_gradient(motion, s.site[p], gradient);
-  s.motion[p] = motion;
   s.forces[p] = {};
 }
 
@@ -203,6 +201,11 @@ static __global__ void __launch_bounds__(ThreadGroup::block, 4)
   lists.near.for_each([&](const ThreadGroup& threads, Index r) {
     const bool inside = passes.find_touch_within(threads, lists.in_range(threads, passes, r), r);
     if (inside && threads.is_first()) lists.inside.add(r);
+  });
+}
+static __global__ void find_carrying(ContactPasses passes, ContactLists lists) {
+  lists.inside.for_each([&](const ThreadGroup& threads, Index r) {
+    passes.find_carrying(threads, lists.in_range(threads, passes, r), r);
   });
 }
 /// Lists the points on which forces act. One thread per point.

@@ -205,6 +205,7 @@ class DeviceBodyContacts {
     launch_whole("find_near_rows", find_near_rows, rows(), passes, of_step, rows());
     if (passes.in_patch) launch_groups("find_patches", find_patches, rows(), passes, of_step);
     launch_groups("find_touches", cuda::find_touches, rows(), passes, of_step);
+    launch_groups("find_carrying", find_carrying, rows(), passes, of_step);
   }
   void find_carriers(const ContactPasses& passes) const {
     const NumberList active = lists_of_step().active;

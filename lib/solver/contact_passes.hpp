@@ -109,9 +109,9 @@ struct ContactPasses {
     const WithinRange in_range(threads, motion[row[r].point], entries_of_row(r), motions());
     if (!comes_near(threads, in_range, r)) return;
     find_patch(in_range, r);
-    find_touch_within(threads, in_range, r);
+    if (find_touch_within(threads, in_range, r)) find_carrying(threads, in_range, r);
   }
-  /// The same in three parts, for devices. First: true if a row's body is so near that its point
+  /// The same in four parts, for devices. First: true if a row's body is so near that its point
   /// may be inside; if not, the row's touch is known. @param in_range its entries within range
   template <class Threads>
   PHYXEL_HD bool comes_near(const Threads& threads, const WithinRange<Threads>& in_range,
@@ -136,22 +136,32 @@ struct ContactPasses {
       in_patch[e] = here.patch < patches.count() && patches.of(site[near[e]].rest) == here.patch;
     });
   }
-  /// Third: finds the touch of a row that comes near. @returns true if its point is inside
+  /// Third: finds the touch of a row that comes near, but for what `find_carrying` adds.
+  /// @returns true if its point is inside
   template <class Threads>
   PHYXEL_HD bool find_touch_within(const Threads& threads, const WithinRange<Threads>& in_range,
                                    Index r) const {
     const ContactRow& here = row[r];
-    const OfPatch of_patch(in_range, here.patches == 1 ? nullptr : in_patch);
     const SurfaceTouch found =
-        surface_touch(of_patch, site[here.point], motion[here.point], entries_of_row(r), sites(),
-                      motions(), field[here.body], here.apart, reach, carries);
-    if (is_active && found.is_inside) {
+        surface_touch(of_patch(in_range, r), site[here.point], motion[here.point],
+                      entries_of_row(r), sites(), motions(), field[here.body], here.apart, reach);
+    set_touch(threads, r, found);
+    return found.is_inside;
+  }
+  /// Fourth: finds who carries the point of a row that is inside.
+  template <class Threads>
+  PHYXEL_HD void find_carrying(const Threads& threads, const WithinRange<Threads>& in_range,
+                               Index r) const {
+    const Index p = row[r].point;
+    SurfaceTouch found = touch[r];
+    carry(of_patch(in_range, r), site[p], motion[p], entries_of_row(r), sites(), motions(), found,
+          carries);
+    if (is_active) {
       in_range.each(entries_of_row(r), [&](Offset e) {
         if (carries[e].weight > 0) is_active[near[e]] = 1;
       });
     }
-    set_touch(threads, r, found);
-    return found.is_inside;
+    if (threads.is_first()) touch[r] = found;
   }
   /// Finds the entries by which other bodies act on a point.
   template <class Threads>
@@ -236,6 +246,12 @@ struct ContactPasses {
   }
 
  protected:
+  /// The entries of a row's patch within range.
+  template <class Threads>
+  PHYXEL_HD OfPatch<WithinRange<Threads>> of_patch(const WithinRange<Threads>& in_range,
+                                                   Index r) const {
+    return {in_range, row[r].patches == 1 ? nullptr : in_patch};
+  }
   /// Sets the touch of a row, and until when it sleeps.
   template <class Threads>
   PHYXEL_HD void set_touch(const Threads& threads, Index r, const SurfaceTouch& found) const {

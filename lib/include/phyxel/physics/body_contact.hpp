@@ -296,8 +296,8 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
   return found;
 }
 
-/// Finds whether a point is inside a body, from the phyxels of the body's surface near it, and how
-/// these carry it.
+/// Finds whether a point is inside a body, from the phyxels of the body's surface near it. Who
+/// carries it is left to `carry`.
 /// @param threads share the phyxels among them (`OneThread`); all return the same
 /// @param list of these phyxels, as of `OneThread::each`
 /// @param site_of,motion_of return those of an entry of the list
@@ -305,22 +305,15 @@ PHYXEL_HD PlaceAtRest place_at_rest(const Threads& threads, const SurfaceSite& s
 /// @param least distance at rest between a point and a part of its own body that it may touch
 /// [m]; 0 for other bodies
 /// @param reach gap below which the point counts as inside, as a share of its range
-/// @param shares zero; receive those of the entries if the point is inside
 template <class Threads, class SiteOf, class MotionOf>
 PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& site,
                                      const SurfaceMotion& point, const Offset* list,
                                      SiteOf&& site_of, MotionOf&& motion_of,
-                                     const PlacedDistances& field, double least, double reach,
-                                     SurfaceShare* shares) {
+                                     const PlacedDistances& field, double least, double reach) {
   SurfaceTouch touch;
   const PlaceAtRest rest = place_at_rest(threads, site, point, list, site_of, motion_of, field);
   touch.is_alone = !(rest.weights > 0);
   if (!(rest.weights > least_weight)) return touch;
-  const auto square_of = [&](Offset k) {
-    const Vec3<double> apart = motion_of(k).after - point.after;
-    return dot(apart, apart);
-  };
-  const auto range_of = [&](Offset k) { return common_range(site.range, site_of(k).range); };
   // What leads back to the point's own neighbourhood is no other part of the body.
   if (const Vec3<double> way = rest.place - site.rest; dot(way, way) < least * least) return touch;
   const double length = std::sqrt(dot(rest.gap.normal, rest.gap.normal));
@@ -334,6 +327,21 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
     return touch;
   }
   touch.is_inside = true;
+  return touch;
+}
+
+/// Finds how the phyxels of a surface carry a point that is inside their body.
+/// @param touch result of `surface_touch`, whose other parameters these are; receives the rest
+/// @param shares zero; receive those of the entries
+template <class Threads, class SiteOf, class MotionOf>
+PHYXEL_HD void carry(const Threads& threads, const SurfaceSite& site, const SurfaceMotion& point,
+                     const Offset* list, SiteOf&& site_of, MotionOf&& motion_of,
+                     SurfaceTouch& touch, SurfaceShare* shares) {
+  const auto square_of = [&](Offset k) {
+    const Vec3<double> apart = motion_of(k).after - point.after;
+    return dot(apart, apart);
+  };
+  const auto range_of = [&](Offset k) { return common_range(site.range, site_of(k).range); };
   const Vec3<double> n = touch.normal;
   double carried = 0;
   threads.each(list, [&](Offset k) {
@@ -368,7 +376,6 @@ PHYXEL_HD SurfaceTouch surface_touch(const Threads& threads, const SurfaceSite& 
   });
   touch.height = -dot(n, threads.sum(reached));
   touch.centre += point.before;
-  return touch;
 }
 
 /// How a point that is inside a body moves, relative to the surface, by a force on it.
