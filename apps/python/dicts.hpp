@@ -125,4 +125,22 @@ inline py::dict arrays_of(const std::vector<ProbeReading>& readings) {
   return values;
 }
 
+/// Columns of history from a dict of arrays. @throws InputError naming what is not so
+inline std::vector<HistoryColumn> history_from(const py::object& history, py::ssize_t rows) {
+  if (!py::isinstance<py::dict>(history)) {
+    throw InputError(fmt::format("history: {} found; allowed: a dict of arrays",
+                                 py::repr(history).cast<std::string>()));
+  }
+  std::vector<HistoryColumn> columns;
+  for (const auto& [key, values] : history.cast<py::dict>()) {
+    if (!py::isinstance<py::str>(key)) {
+      throw InputError(fmt::format("history: the key {} found; allowed: names of columns",
+                                   py::repr(key).cast<std::string>()));
+    }
+    const auto name = key.cast<std::string>();
+    columns.push_back({name, numbers_from(values, "history, " + name, rows)});
+  }
+  return columns;
+}
+
 }  // namespace phyxel::python

@@ -14,7 +14,72 @@ std::unique_ptr<Simulation> simulate(const std::optional<std::filesystem::path>&
                                       overrides);
 }
 
+app::ViewOptions view_options(double pace, bool paused, int port, const std::string& host) {
+  if (!(pace >= 1e-6 && pace <= 1e3)) {
+    throw InputError(fmt::format("pace: {} found; allowed: 1e-06 to 1000", pace));
+  }
+  if (port < 0 || port > 65535) {
+    throw InputError(fmt::format("port: {} found; allowed: 0 to 65535", port));
+  }
+  app::ViewOptions options;
+  options.pace = pace;
+  options.paused = paused;
+  options.port = port;
+  options.host = host;
+  options.prints = false;
+  options.farewell = "The view was closed; the simulation goes on in Python.";
+  return options;
+}
+
 }  // namespace
+
+std::string Simulation::open_view(const std::map<std::string, Cloud>& clouds,
+                                  app::ViewOptions options,
+                                  const std::optional<std::filesystem::path>& out) {
+  if (view_) throw InputError("this simulation has a view; allowed: one, until its close()");
+  const auto turn = my_turn();
+  view_ = [&] {
+    const py::gil_scoped_release others;
+    Scene scene = scene_;
+    if (out) scene.output.directory = *out;
+    return std::make_unique<SimulationView>(
+        std::move(options), std::move(scene), built_,
+        [this, clouds](const Scene& changed) { return built(changed, clouds); });
+  }();
+  built_->solver->observe({});  // the view's thread knows nothing of Python
+  view_->start([this](const std::function<void()>& work) {
+    const std::lock_guard lock(busy_);
+    work();
+    follow_view();
+  });
+  return view_->address();
+}
+
+void Simulation::follow_view() {
+  const app::LiveScene& live = view_->live();
+  if (live.built() == built_) return;
+  built_ = live.built();
+  Scene changed = live.scene();
+  changed.output = scene_.output;
+  scene_ = std::move(changed);
+  recovery_.reset();
+  fields_.reset();
+  on_surface_.reset();
+  probes_.reset();
+}
+
+void Simulation::close_view() {
+  if (!view_) return;
+  {
+    const py::gil_scoped_release others;
+    view_->stop();
+  }
+  const auto turn = my_turn();
+  const std::unique_ptr<SimulationView> ended = std::move(view_);
+  looked_ = built_->solver->steps();
+  observe();
+  ended->finish();
+}
 
 void add_simulation(py::module_& module) {
   using namespace py::literals;
@@ -28,8 +93,13 @@ void add_simulation(py::module_& module) {
       .def_readonly("lane", &Live::lane, "(n,)");
 
   const auto of_model = [](auto member) {
-    return
-        [member](py::object self) { return view(self.cast<Simulation&>().model().*member, self); };
+    return [member](const Simulation& s) {
+      const auto steps = s.steps();
+      return view(steps->model().*member, keeper(steps));
+    };
+  };
+  const auto reading = [](auto read) {
+    return [read](const Simulation& s) { return s.reading(read); };
   };
   py::class_<Simulation>(module, "SimulationBase")
       .def(py::init([](const std::optional<std::filesystem::path>& file, const std::string& text,
@@ -161,7 +231,7 @@ void add_simulation(py::module_& module) {
            "Replaces displacements [m], velocities [m/s], both (n, 3), or history, {name: (n,)};\n"
            "time goes on. An empty history is the virgin material.")
       .def_property_readonly(
-          "live", [](py::object self) { return self.cast<Simulation&>().live(self); },
+          "live", [](const Simulation& s) { return s.live(); },
           "The state without a copy (on the CPU): see Live.")
       .def_property_readonly(
           "displacement", [](const Simulation& s) { return taken(s.state().displacement); },
@@ -182,10 +252,11 @@ void add_simulation(py::module_& module) {
           "equivalent_plastic_strain. Empty for elastic materials without viscosity.")
       .def_property(
           "external_forces",
-          [](py::object self) {
-            const auto force = self.cast<Simulation&>().backend().external_forces();
-            std::vector<Vec3d> copy(force.begin(), force.end());
-            return taken(std::move(copy));
+          [](const Simulation& s) {
+            return taken(s.reading([](const app::BuiltScene& steps) {
+              const auto force = steps.backend->external_forces();
+              return std::vector<Vec3d>(force.begin(), force.end());
+            }));
           },
           &Simulation::set_external_forces,
           "Forces of your own [N], (n, 3), copied when set; they act until set again. None: none.")
@@ -194,54 +265,68 @@ void add_simulation(py::module_& module) {
       .def_property_readonly("volume", of_model(&Model::volume), "At rest [m^3], (n,)")
       .def_property_readonly(
           "triangles",
-          [](py::object self) -> py::array {
-            Simulation& s = self.cast<Simulation&>();
+          [](const Simulation& s) -> py::array {
             if (auto uncut = s.uncut()) return taken(std::move(*uncut));
-            return view(s.model().surfels.triangle, self);
+            const auto steps = s.steps();
+            return view(steps->model().surfels.triangle, keeper(steps));
           },
           "Of the surface, (t, 3): those that no crack crosses now.")
       .def_property_readonly(
           "neighbours",
-          [](py::object self) {
-            const Csr& lists =
-                self.cast<Simulation&>().model().with_lists().neighbourhood.neighbours;
-            return py::make_tuple(view(lists.offsets, self), view(lists.indices, self));
+          [](const Simulation& s) {
+            const auto steps = s.steps();
+            const Csr& lists = steps->model().with_lists().neighbourhood.neighbours;
+            return py::make_tuple(view(lists.offsets, keeper(steps)),
+                                  view(lists.indices, keeper(steps)));
           },
           "Lists of neighbours as (offsets, indices): those of i are\n"
           "indices[offsets[i]:offsets[i + 1]].")
       .def_property_readonly(
-          "time", [](const Simulation& s) { return s.solver().time(); }, "[s]")
+          "time", reading([](const app::BuiltScene& b) { return b.solver->time(); }), "[s]")
+      .def_property_readonly("steps",
+                             reading([](const app::BuiltScene& b) { return b.solver->steps(); }),
+                             "Taken so far.")
+      .def_property_readonly("dt", reading([](const app::BuiltScene& b) { return b.solver->dt(); }),
+                             "Time step [s].")
       .def_property_readonly(
-          "steps", [](const Simulation& s) { return s.solver().steps(); }, "Taken so far.")
-      .def_property_readonly(
-          "dt", [](const Simulation& s) { return s.solver().dt(); }, "Time step [s].")
-      .def_property_readonly(
-          "largest_step", [](const Simulation& s) { return s.plan().limit.largest_step; },
+          "largest_step",
+          reading([](const app::BuiltScene& b) { return b.plan.limit.largest_step; }),
           "Largest stable time step of Verlet's method [s]; 0 for other methods.")
+      .def_property_readonly("end", reading([](const app::BuiltScene& b) {
+                               return b.plan.dt * static_cast<double>(b.plan.steps);
+                             }),
+                             "Of the scene [s].")
       .def_property_readonly(
-          "end",
-          [](const Simulation& s) { return s.plan().dt * static_cast<double>(s.plan().steps); },
-          "Of the scene [s].")
-      .def_property_readonly(
-          "residual", [](const Simulation& s) { return s.solver().work().residual; },
+          "residual", reading([](const app::BuiltScene& b) { return b.solver->work().residual; }),
           "Largest force that Newton's method has left, of what acts.")
-      .def_property_readonly(
-          "device", [](const Simulation& s) { return s.backend().name(); }, "What steps, in words.")
+      .def_property_readonly("device",
+                             reading([](const app::BuiltScene& b) { return b.backend->name(); }),
+                             "What steps, in words.")
       .def_property_readonly(
           "directory", [](const Simulation& s) { return s.scene().output.directory; },
           "Output folder of the scene, as `phyxel run` takes it.")
-      .def_property_readonly("warnings", [](const Simulation& s) { return s.model().warnings; })
+      .def_property_readonly("warnings",
+                             reading([](const app::BuiltScene& b) { return b.model().warnings; }))
       .def_property_readonly(
           "memory",
           [](const Simulation& s) {
             py::dict bytes;
-            for (const ArrayBytes& array : s.backend().memory()) {
+            for (const ArrayBytes& array :
+                 s.reading([](const app::BuiltScene& b) { return b.backend->memory(); })) {
               bytes[py::str(array.name)] = array.bytes;
             }
             return bytes;
           },
           "Bytes the device holds: {array: bytes}.")
-      .def("__len__", [](const Simulation& s) { return s.model().size(); });
+      .def("__len__", reading([](const app::BuiltScene& b) { return b.model().size(); }))
+      .def(
+          "_open_view",
+          [](Simulation& s, const std::map<std::string, Cloud>& clouds, double pace, bool paused,
+             int port, const std::string& host, const std::optional<std::filesystem::path>& out) {
+            return s.open_view(clouds, view_options(pace, paused, port, host), out);
+          },
+          "clouds"_a, "pace"_a, "paused"_a, "port"_a, "host"_a, "out"_a)
+      .def("_close_view", &Simulation::close_view);
 }
 
 }  // namespace phyxel::python

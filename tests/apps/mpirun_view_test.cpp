@@ -1,5 +1,9 @@
 /// Sessions of a live view on several ranks under mpirun.
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <fstream>
+#include <sstream>
 
 #include "mpirun.hpp"
 #include "phyxel/checkpoint.hpp"
@@ -34,6 +38,49 @@ TEST_F(Mpirun, RepeatsASessionOnAnyNumberOfRanks) {
     }
   }
 }
+
+#ifdef PHYXEL_HAVE_VIEW
+
+/// The processor time of the children of a process so far [s].
+double seconds_of_children(pid_t parent) {
+  double ticks = 0;
+  for (const auto& process : std::filesystem::directory_iterator("/proc")) {
+    std::ifstream file(process.path() / "stat");
+    std::string text((std::istreambuf_iterator<char>(file)), {});
+    const std::size_t name_end = text.rfind(')');
+    if (name_end == std::string::npos) continue;
+    std::istringstream fields(text.substr(name_end + 1));
+    std::string state, skipped;
+    pid_t of = 0;
+    fields >> state >> of;
+    if (of != parent) continue;
+    for (int k = 5; k <= 13; ++k) fields >> skipped;  // utime is the 14th field of proc(5)
+    double user = 0, system = 0;
+    fields >> user >> system;
+    ticks += user + system;
+  }
+  return ticks / static_cast<double>(sysconf(_SC_CLK_TCK));
+}
+
+// Ranks that wait in a collective call of MPI would take a core each.
+TEST_F(Mpirun, SleepsWhileAViewIsPaused) {
+  write("scene.toml", test::session_scene());
+  use_ranks(3);
+  const pid_t child = start({"view", "scene.toml", "--paused", "--port", "0"});
+  ASSERT_TRUE(comes_true(
+      [&] { return test::text_of(folder_ / "stdout.txt").find("token") != std::string::npos; }));
+  const double before = seconds_of_children(child);
+  EXPECT_GT(before, 0);
+  constexpr double waited = 2;
+  std::this_thread::sleep_for(std::chrono::duration<double>(waited));
+  // Three ranks that sleep took 3% of the time of one core where this was measured; those that spin
+  // take all cores, or what other work leaves of them.
+  EXPECT_LT(seconds_of_children(child) - before, 0.25 * waited);
+  kill(child, SIGUSR2);  // mpirun passes it on
+  EXPECT_EQ(finish(child).code, 0);
+}
+
+#endif
 
 }  // namespace
 }  // namespace phyxel

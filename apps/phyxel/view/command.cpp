@@ -3,10 +3,12 @@
 
 #include <CLI/CLI.hpp>
 #include <memory>
+#include <optional>
 
 #include "phyxel/error.hpp"
 #include "program_ranks.hpp"
 #include "progress.hpp"
+#include "stop_signal.hpp"
 #include "view/session.hpp"
 
 namespace phyxel::app {
@@ -20,11 +22,16 @@ void view(const ViewOptions& options) {
   if (!(options.pace > 0)) {
     throw AgreedError(ExitCode::bad_input, "--pace nan: allowed: 1e-06 to 1000");
   }
-  std::unique_ptr<Session> session;
+  const StopSignal signals(all_ranks().leads());
+  std::optional<LiveScene> live;
+  std::optional<Session> session;
   {
     const SetupProgress progress(all_ranks().leads() ? stderr : nullptr);
-    session = std::make_unique<Session>(options);
+    live.emplace(ranks().agreed([&] { return scene_with(options.overrides); }), options.cut,
+                 options.overrides.unsafe_step);
+    session.emplace(options, *live);
   }
+  StopSignal::work_begins();
   session->run();
 }
 

@@ -49,7 +49,8 @@ Grabbed grabbed(const Model& model, Index phyxel) {
 
 }  // namespace
 
-Hand::Hand(const Model& model, Index phyxel, double dt) : model_(model) {
+Hand::Hand(const Model& model, Index phyxel, double dt, std::span<const Vec3d> others)
+    : model_(model), others_(others) {
   const Grabbed at = grabbed(model, phyxel);
   double mass = 0, volume = 0, speed = 0, density = 0;
   Index size = 0;
@@ -125,8 +126,9 @@ void Hand::pull(Backend& backend, double lag) {
   force_ = force;
   pulled_at_ = now.before;
   since_ = 0;
-  std::vector<Vec3d> forces(static_cast<std::size_t>(model_.size()));
-  for (std::size_t k = 0; k < phyxels_.size(); ++k) forces[phyxels_[k]] = share_[k] * force;
+  std::vector<Vec3d> forces(others_.begin(), others_.end());
+  forces.resize(static_cast<std::size_t>(model_.size()));
+  for (std::size_t k = 0; k < phyxels_.size(); ++k) forces[phyxels_[k]] += share_[k] * force;
   backend.set_external_forces(forces);
 }
 
@@ -142,7 +144,7 @@ double Hand::work_until(const Backend& backend, double lag) const {
 double Hand::let_go(Backend& backend, double lag) {
   if (pulls_) work_ += work_since_pull(mean(backend, lag));
   pulls_ = false;
-  backend.set_external_forces({});
+  backend.set_external_forces(others_);
   return work_;
 }
 

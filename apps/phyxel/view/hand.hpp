@@ -1,6 +1,7 @@
 /// The hand of a user: a spring that pulls a part of a body.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "phyxel/backend.hpp"
@@ -19,8 +20,10 @@ class Hand {
   static constexpr int interval = 4;
 
   /// @param phyxel global id of the grabbed phyxel @param dt step [s]
+  /// @param others external forces that act beside the hand's [N]: one for each phyxel of this
+  ///   rank's model, or none; must outlive the hand
   /// @throws InputError for a phyxel that does not exist
-  Hand(const Model& model, Index phyxel, double dt);
+  Hand(const Model& model, Index phyxel, double dt, std::span<const Vec3d> others = {});
 
   /// Moves the spring's end that the user holds. @param by [m] from where the patch was grabbed
   void move(Vec3d by) { by_ = by; }
@@ -31,7 +34,7 @@ class Hand {
   void pull(Backend& backend, double lag);
   /// Counts steps of `dt` [s] that have been taken, no more than were left until the next change.
   void stepped(int steps, double dt);
-  /// Removes the forces. @returns the work done on the body since the patch was grabbed [J]
+  /// Removes the hand's forces. @returns the work done on the body since the patch was grabbed [J]
   double let_go(Backend& backend, double lag);
 
   /// Work of the forces up to the present state [J].
@@ -52,6 +55,7 @@ class Hand {
   double work_since_pull(const Patch& now) const;
 
   const Model& model_;
+  std::span<const Vec3d> others_;
   std::vector<Index> phyxels_;  // of this rank's
   std::vector<double> share_;   // of the force that acts on each
   double stiffness_ = 0;        // [N/m]

@@ -79,6 +79,7 @@ Json data_of(const LiveScene& live, const LivePicture& picture, const Instance& 
   data["obstacles"] = obstacles_json(obstacles, RigidPaths(), start, extent);
   data["only_floor"] = floor;
   data["spacing"] = picture.spacing() / extent.radius;
+  data["reach"] = carrier_reach(picture.spacing()) / extent.radius;
   data["carriers"] = Carriers::each;
   data["settings"] = settings_of(live.scene());
   data["step"] = live.solver().dt();
@@ -114,6 +115,7 @@ std::string live_page(const LiveScene& live, const LivePicture& picture, const s
   elements += obstacle_elements(obstacles, extent);
   std::string title = live.scene().title;
   if (title.empty()) title = live.scene().file.stem().string();
+  if (title.empty()) title = "A simulation";
   const std::string summary = fmt::format(
       "{} phyxels, {} surfels, {}",
       with_separators(static_cast<std::size_t>(live.model().global_count())),

@@ -61,58 +61,55 @@ Scene with_settings(Scene scene, const Settings& settings) {
   return scene;
 }
 
-/// The model with its backend and solver, which a change of settings makes anew.
-struct LiveScene::Built {
-  Built(const Scene& scene, const ChosenDevice& device, const CutOptions& cut, bool unsafe_step)
-      : shared(all_ranks(), scene, device, cut),
-        backend(shared.make_backend(scene.solver.precision, scene.solver.threads)),
-        plan(plan_steps(scene, shared.here(), *backend, unsafe_step)) {}
+namespace {
 
-  SharedModel shared;
-  std::unique_ptr<Backend> backend;
-  StepPlan plan;
-  std::optional<Solver> solver;
-  std::optional<StepControl> control;
-  std::optional<StabilityWatch> watch;
-};
+void check_method(const Scene& scene) {
+  if (scene.solver.method != Method::equilibrium) return;
+  throw InputError(
+      "method \"equilibrium\": it finds a state of rest, which does not move; allowed for a live "
+      "view: verlet, implicit");
+}
+
+/// Builds scenes for all ranks of the program.
+SceneBuilder builder_of(const Scene& scene, CutOptions cut, bool unsafe_step) {
+  return [device = choose_device(scene.solver.device, "device"), cut = std::move(cut),
+          unsafe_step](const Scene& changed) {
+    return std::make_shared<BuiltScene>(
+        std::make_unique<const SharedModel>(all_ranks(), changed, device, cut), changed,
+        unsafe_step);
+  };
+}
+
+}  // namespace
 
 LiveScene::LiveScene(Scene scene, CutOptions cut, bool unsafe_step)
     : given_(std::move(scene)),
       scene_(given_),
-      device_(choose_device(scene_.solver.device, "device")),
-      cut_(std::move(cut)),
-      unsafe_step_(unsafe_step) {
-  if (scene_.solver.method == Method::equilibrium) {
-    throw InputError(
-        "method \"equilibrium\": it finds a state of rest, which does not move; allowed for a live "
-        "view: verlet, implicit");
-  }
-  auto made = built(scene_);
-  const State state = initial_state(made->shared.here(), scene_, made->plan.dt);
-  begin(std::move(made), state);
+      builder_(builder_of(scene_, std::move(cut), unsafe_step)) {
+  check_method(scene_);
+  reset();
 }
 
-LiveScene::~LiveScene() = default;
-
-const SharedModel& LiveScene::shared() const { return built_->shared; }
-Backend& LiveScene::backend() const { return *built_->backend; }
-const Solver& LiveScene::solver() const { return *built_->solver; }
-
-std::unique_ptr<LiveScene::Built> LiveScene::built(const Scene& scene) const {
-  return std::make_unique<Built>(scene, device_, cut_, unsafe_step_);
+LiveScene::LiveScene(Scene scene, std::shared_ptr<BuiltScene> steps, SceneBuilder builder)
+    : given_(std::move(scene)),
+      scene_(given_),
+      builder_(std::move(builder)),
+      built_(std::move(steps)) {
+  check_method(scene_);
+  const std::span<const Vec3d> forces = built_->backend->external_forces();
+  forces_.assign(forces.begin(), forces.end());
+  taken_over_ = built_->solver->state();
+  now_ = diagnose(model(), backend(), solver());
 }
 
-void LiveScene::begin(std::unique_ptr<Built> built, const State& state) {
+void LiveScene::begin(std::shared_ptr<BuiltScene> built, const State& state) {
   built_ = std::move(built);
-  Built& b = *built_;
-  b.solver.emplace(model(), *b.backend, state, scene_.solver.method);
-  b.control.emplace(model(), *b.backend, b.plan);
-  now_ = diagnose(model(), *b.backend, *b.solver);
-  b.watch.emplace(model(), now_);
+  if (!forces_.empty()) backend().set_external_forces(forces_);
+  now_ = built_->begin(state, scene_.solver.method);
 }
 
 void LiveScene::advance(std::int64_t count) {
-  Built& b = *built_;
+  BuiltScene& b = *built_;
   while (count > 0) {
     b.plan.halve(b.control->look(*b.solver, b.plan.halvings));
     if (hand_ && hand_->until_due() == 0) hand_->pull(*b.backend, b.solver->now().lag);
@@ -127,18 +124,21 @@ void LiveScene::advance(std::int64_t count) {
 }
 
 const Diagnostics& LiveScene::look() {
-  Built& b = *built_;
+  BuiltScene& b = *built_;
   b.backend->wait();
-  now_ = diagnose(model(), *b.backend, *b.solver);
   // The hand brings energy in, so that after it the watch begins anew.
-  if (hand_ || acted_) {
-    b.watch.emplace(model(), now_);
-  } else {
-    b.watch->check(now_, &*b.control);
-  }
+  if (hand_ || acted_) b.watch.reset();
+  now_ = b.look();
+  if (!b.watch && forces_.empty()) b.watch.emplace(model(), now_);
   acted_ = false;
   if (hand_) held_work_ = hand_->work_until(*b.backend, b.solver->now().lag);
   return now_;
+}
+
+void LiveScene::finish() {
+  let_go();
+  acted_ = true;
+  look();
 }
 
 void LiveScene::let_go() {
@@ -153,7 +153,7 @@ void LiveScene::apply(const Request& act) {
   acted_ = true;
   switch (act.kind) {
     case RequestKind::grab: {
-      Hand hand(model(), act.phyxel, solver().dt());
+      Hand hand(model(), act.phyxel, solver().dt(), forces_);
       let_go();
       hand_.emplace(std::move(hand));
       break;
@@ -167,18 +167,31 @@ void LiveScene::apply(const Request& act) {
     case RequestKind::set:
       set(act.settings);
       break;
-    case RequestKind::reset: {
-      auto made = built(scene_);
-      hand_.reset();
-      worked_ = held_work_ = 0;
-      pushed_ = {};
-      const State state = initial_state(made->shared.here(), scene_, made->plan.dt);
-      begin(std::move(made), state);
+    case RequestKind::reset:
+      reset();
       break;
-    }
     default:
       break;
   }
+}
+
+void LiveScene::reset() {
+  std::shared_ptr<BuiltScene> made = builder_(scene_);
+  State state;
+  if (!taken_over_) {
+    state = initial_state(made->model(), scene_, made->plan.dt);
+  } else if (settings_ == Settings{}) {
+    state = *taken_over_;
+  } else {
+    const std::shared_ptr<BuiltScene> first = builder_(given_);
+    if (!forces_.empty()) first->backend->set_external_forces(forces_);
+    first->begin(*taken_over_, scene_.solver.method);
+    state = carried_over(*first, *made);
+  }
+  hand_.reset();
+  worked_ = held_work_ = 0;
+  pushed_ = {};
+  begin(std::move(made), state);
 }
 
 void LiveScene::refresh_ghosts(State& state) const {
@@ -187,9 +200,9 @@ void LiveScene::refresh_ghosts(State& state) const {
   phyxel::refresh_ghosts(*model().share, state.velocity);
 }
 
-void LiveScene::move_velocities(Built& by, State& state, double share) const {
+void LiveScene::move_velocities(BuiltScene& by, State& state, double share) const {
   if (scene_.solver.method != Method::verlet) return;
-  Solver solver(by.shared.here(), *by.backend, state, Method::verlet);
+  Solver solver(by.model(), *by.backend, state, Method::verlet);
   solver.step(1);
   by.backend->wait();
   const State next = solver.state();
@@ -202,8 +215,7 @@ void LiveScene::move_velocities(Built& by, State& state, double share) const {
   refresh_ghosts(state);
 }
 
-State LiveScene::carried_over(Built& next) const {
-  Built& from = *built_;
+State LiveScene::carried_over(BuiltScene& from, BuiltScene& next) const {
   from.backend->wait();
   State state = from.solver->state();
   refresh_ghosts(state);
@@ -235,10 +247,11 @@ void LiveScene::set(const Settings& settings) {
   Settings all = settings_;
   all.take(settings);
   Scene changed = with_settings(given_, all);
-  auto made = built(changed);  // throws before anything has changed
-  check_cut(model(), made->shared.here());
+  std::shared_ptr<BuiltScene> made = builder_(changed);  // throws before anything has changed
+  check_cut(model(), made->model());
   let_go();
-  const State state = carried_over(*made);
+  if (!forces_.empty()) made->backend->set_external_forces(forces_);
+  const State state = carried_over(*built_, *made);
   settings_ = all;
   scene_ = std::move(changed);
   begin(std::move(made), state);

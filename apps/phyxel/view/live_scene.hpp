@@ -2,15 +2,14 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "phyxel/diagnostics.hpp"
-#include "phyxel/shared_model.hpp"
-#include "phyxel/solver.hpp"
-#include "phyxel/step_control.hpp"
 #include "setup.hpp"
+#include "view/built_scene.hpp"
 #include "view/hand.hpp"
 #include "view/request.hpp"
 
@@ -19,6 +18,9 @@ namespace phyxel::app {
 /// A scene with changed values. Settings that it has nothing for leave it as it is.
 Scene with_settings(Scene scene, const Settings& settings);
 
+/// Builds a scene that has changed values. @throws Error if it cannot be built
+using SceneBuilder = std::function<std::shared_ptr<BuiltScene>(const Scene&)>;
+
 /// The model, backend and solver of a scene, and what acts have made of them. All functions but
 /// const ones are collective, and the same acts at the same steps give the same bits on any number
 /// of ranks.
@@ -26,7 +28,9 @@ class LiveScene {
  public:
   /// @throws InputError for a search for equilibrium, which has no time; DeviceError
   LiveScene(Scene scene, CutOptions cut, bool unsafe_step);
-  ~LiveScene();
+  /// Takes over a scene that steps: its present state, to which a reset goes back, and its external
+  /// forces, which go on acting. @throws InputError likewise
+  LiveScene(Scene scene, std::shared_ptr<BuiltScene> steps, SceneBuilder builder);
 
   /// Takes `count` steps. @throws DivergedError
   void advance(std::int64_t count);
@@ -35,13 +39,20 @@ class LiveScene {
   void apply(const Request& act);
   /// Finds energies and momenta, and checks the state. @throws DivergedError
   const Diagnostics& look();
+  /// Lets go of what the hand holds, so that the scene can go on without this. @throws
+  /// DivergedError
+  void finish();
 
   /// The scene with all settings.
   const Scene& scene() const { return scene_; }
-  const SharedModel& shared() const;
-  const Model& model() const { return shared().here(); }
-  Backend& backend() const;
-  const Solver& solver() const;
+  const SharedModel& shared() const { return *built_->shared; }
+  const Model& model() const { return built_->model(); }
+  Backend& backend() const { return *built_->backend; }
+  const Solver& solver() const { return *built_->solver; }
+  /// What steps now; acts that change values replace it.
+  const std::shared_ptr<BuiltScene>& built() const { return built_; }
+  /// True if the acts began at the start of the scene.
+  bool began_with_scene() const { return !taken_over_; }
   /// The result of the last look.
   const Diagnostics& now() const { return now_; }
   /// Number of steps since the start, which resets and changes of the step's size do not change.
@@ -56,24 +67,24 @@ class LiveScene {
   Vec3d hand_impulse() const { return pushed_ + (hand_ ? hand_->impulse() : Vec3d{}); }
 
  private:
-  struct Built;
-  std::unique_ptr<Built> built(const Scene& scene) const;
-  void begin(std::unique_ptr<Built> built, const State& state);
+  void begin(std::shared_ptr<BuiltScene> built, const State& state);
   void set(const Settings& settings);
+  void reset();
   void let_go();
-  /// The present state for the next model, whose planned step it changes to one that fits the time.
-  State carried_over(Built& next) const;
+  /// The state of a model for the next model, whose planned step it changes to one that fits the
+  /// time.
+  State carried_over(BuiltScene& from, BuiltScene& next) const;
   /// Changes velocities by a share of what a model's next step of Verlet's method adds.
-  void move_velocities(Built& by, State& state, double share) const;
+  void move_velocities(BuiltScene& by, State& state, double share) const;
   void refresh_ghosts(State& state) const;
 
   const Scene given_;  // without settings
   Scene scene_;
   Settings settings_;
-  ChosenDevice device_;
-  CutOptions cut_;
-  bool unsafe_step_;
-  std::unique_ptr<Built> built_;
+  SceneBuilder builder_;
+  std::shared_ptr<BuiltScene> built_;
+  std::optional<State> taken_over_;  // the state at the start, if it is not the scene's
+  std::vector<Vec3d> forces_;        // external ones beside the hand's [N], or none
   std::optional<Hand> hand_;
   std::int64_t taken_ = 0;
   double worked_ = 0;     // by the hand, before it grabbed what it holds [J]

@@ -13,6 +13,7 @@
 #include "outside_text.hpp"
 #include "phyxel/error.hpp"
 #include "program_ranks.hpp"
+#include "stop_signal.hpp"
 #include "version.hpp"
 #include "view/live_page.hpp"
 
@@ -51,11 +52,9 @@ void add_merged(std::vector<Request>& acts, const Request& act) {
 
 }  // namespace
 
-Session::Session(const ViewOptions& options)
+Session::Session(const ViewOptions& options, LiveScene& live)
     : options_(options),
-      signals_(ranks().rank() == 0),
-      live_(ranks().agreed([&] { return scene_with(options.overrides); }), options.cut,
-            options.overrides.unsafe_step),
+      live_(live),
       playing_(!options.paused),
       pace_(options.pace),
       until_(options.overrides.until) {
@@ -82,19 +81,23 @@ Session::Session(const ViewOptions& options)
       const std::string about =
           fmt::format("{}, steps of {:.3g} s", live_.backend().name(), live_.solver().dt());
       server_.emplace(options.host, options.port, live_page(live_, *picture_, about));
+      if (!options.prints) return;
       fmt::print("{}\n", server_->address());
       std::fflush(stdout);
     });
   }
-  StopSignal::work_begins();
 }
 
-void Session::run() {
+void Session::run(const Around& around) {
   since_ = last_look_ = last_frame_ = Clock::now();
-  while (true) {
-    const Turn turn = agreed(all_ranks().leads() ? decided() : Turn());
+  for (bool rests = false;;) {
+    const Turn decision = all_ranks().leads() ? decided() : Turn();
+    // While nothing happens, the first rank sleeps until messages come, and so do others.
+    if (rests) ranks().wait_asleep();
+    const Turn turn = agreed(decision);
+    rests = turn.steps == 0 && turn.acts.empty();
     if (turn.end) break;
-    take(turn);
+    around([&] { take(turn); });
   }
   // Only the first rank knows what is left.
   const std::int64_t left = ranks().sum(
@@ -104,7 +107,7 @@ void Session::run() {
                       fmt::format("stopped by a signal at t = {:g} s; {} acts are left",
                                   live_.solver().time(), left));
   }
-  if (server_) server_->send_text(R"({"message": "The program has ended."})");
+  tell(options_.farewell);
 }
 
 Session::Turn Session::agreed(Turn turn) const {
@@ -129,7 +132,8 @@ Session::Turn Session::agreed(Turn turn) const {
 
 Session::Turn Session::decided() {
   Turn turn;
-  turn.end = StopSignal::stop_requested() != 0 || (options_.headless && to_replay_.empty());
+  turn.end =
+      stops_ || StopSignal::stop_requested() != 0 || (options_.headless && to_replay_.empty());
   if (turn.end) return turn;
   if (server_) {
     read_messages();
@@ -347,10 +351,12 @@ void Session::save() {
     info.total_energy = now.total_energy();
     info.watched = {now.total_energy(), now.largest_speed, now.kinetic_and_elastic_energy()};
     checkpoint = write_checkpoint(folder, *state, info, live_.model().global_count(), values);
+    if (!live_.began_with_scene()) return;  // nothing could repeat it
     write_whole_file(folder / "session.jsonl", text_of(recording_), Durable::yes);
   });
   writer.finish();
-  if (all_ranks().leads()) {
+  if (!live_.began_with_scene()) return tell(fmt::format("Saved: {}.", checkpoint.string()));
+  if (all_ranks().leads() && options_.prints) {
     fmt::print("saved {} and session.jsonl beside it\n", checkpoint.string());
     std::fflush(stdout);
   }

@@ -1,17 +1,18 @@
 /// The loop of a live view: requests, steps, frames.
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "setup.hpp"
-#include "stop_signal.hpp"
 #include "stopwatch.hpp"
 #include "view/live_picture.hpp"
 #include "view/live_scene.hpp"
@@ -29,15 +30,27 @@ struct ViewOptions {
   bool paused = false;    ///< True to wait for "play".
   bool headless = false;  ///< True to replay a session without a page.
   std::string replay;     ///< File of a session, or "".
+  bool prints = true;     ///< True to print the address, and what is saved.
+  std::string farewell = "The program has ended.";  ///< What the page shows in the end.
 };
 
 /// A live view from its set-up to its end. All ranks step; the first one serves the page, decides
 /// on the next turn, which it sends to all.
 class Session {
  public:
-  explicit Session(const ViewOptions& options);
-  /// Runs until a signal comes or, without a page, the recording ends.
-  void run();
+  /// Runs one turn: calls its argument once.
+  using Around = std::function<void(const std::function<void()>&)>;
+
+  /// @param options,live must outlive the session
+  /// @throws InputError for a port that is taken, or a recording of another run
+  Session(const ViewOptions& options, LiveScene& live);
+  /// Runs until `stop`, until a signal comes (`StopSignal`) or, without a page, until the recording
+  /// ends. @param around what runs each turn, which changes the scene
+  void run(const Around& around = [](const auto& turn) { turn(); });
+  /// Requests the end, from any thread.
+  void stop() { stops_ = true; }
+  /// The page's address.
+  std::string address() const { return server_->address(); }
 
  private:
   /// The next actions of all ranks.
@@ -70,8 +83,8 @@ class Session {
   std::filesystem::path next_folder() const;
 
   const ViewOptions& options_;
-  StopSignal signals_;
-  LiveScene live_;
+  LiveScene& live_;
+  std::atomic<bool> stops_ = false;
   std::optional<LivePicture> picture_;
   std::optional<ViewServer> server_;
   Recording recording_;

@@ -106,7 +106,8 @@ class Simulation(SimulationBase):
             text = scene
         else:
             file = os.fspath(scene)
-        super().__init__(file, text, dict(clouds or {}), device, precision, method, threads, step,
+        self._clouds = dict(clouds or {})
+        super().__init__(file, text, self._clouds, device, precision, method, threads, step,
                          end, unsafe_step, progress)
         self._made = True
 
@@ -114,6 +115,25 @@ class Simulation(SimulationBase):
     def position(self) -> numpy.ndarray:
         """Deformed positions [m], (n, 3), a copy."""
         return self.rest + self.displacement
+
+    def view(self, *, pace: float = 1, paused: bool = False, port: int = 0, host: str = "127.0.0.1",
+             out: str | os.PathLike[str] | None = None) -> View:
+        """Shows this simulation live, from its present state, and returns the View, whose page a
+        browser or a notebook's cell shows. The page steps the simulation; until the view's close(),
+        others can read it, but not change it.
+
+            with simulation.view() as live:
+                input(live.address)     # look, pull, change gravity; then go on
+            simulation.run()
+
+        pace: simulated s a second. paused: wait for the page's Play. port: 0 for any that is free.
+        host: address to listen at. out: folder of what the page saves, instead of the scene's.
+        What users set in the page, such as gravity, stays after close(); external forces go on.
+        Raises InputError for a search for equilibrium, a second view, or a port that is taken.
+        """
+        # The end holds the simulation, which must not end before its view.
+        address = self._open_view(self._clouds, pace, paused, port, host, out)
+        return View(address, self._close_view)
 
     def __repr__(self):
         if not hasattr(self, "_made"):  # who looks at a traceback

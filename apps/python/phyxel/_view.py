@@ -6,9 +6,13 @@ import os
 import pathlib
 import subprocess
 import tempfile
-from typing import Any
+import weakref
+from typing import TYPE_CHECKING, Any
 
 from ._program import program
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 _options = {"device": str, "precision": str, "method": str, "threads": int, "step": float,
             "unsafe_step": bool, "pace": float, "paused": bool, "port": int, "host": str,
@@ -16,46 +20,21 @@ _options = {"device": str, "precision": str, "method": str, "threads": int, "ste
 
 
 class View:
-    """A scene that runs in the program `phyxel view` until `close`, or until Python ends.
+    """A scene that runs live until `close`, or until Python ends: that of `phyxel.view`, or of
+    `Simulation.view`.
 
     address: of its page, with the token that lets a browser in. In a notebook, the view shows the
     page in its cell.
     """
 
-    def __init__(self, scene: str | os.PathLike[str] | dict[str, Any], **options: Any) -> None:
-        found = program()
-        if found is None:
-            raise RuntimeError("phyxel.view: this module has no program beside it; allowed: one that "
-                               "\"pip install\" installed, or that of a build with the target "
-                               "phyxel_program")
-        if isinstance(scene, dict):
-            from . import to_toml
-            self._folder = tempfile.TemporaryDirectory()  # as long as the view
-            file = pathlib.Path(self._folder.name) / "scene.toml"
-            file.write_text(to_toml(scene))
-            scene = file
-        words = [str(found), "view", os.fspath(scene)]
-        for name, value in {"port": 0, **options}.items():
-            if name not in _options:
-                raise TypeError(f"phyxel.view: {name}: unknown; allowed: {', '.join(_options)}")
-            flag = "--" + name.replace("_", "-")
-            if _options[name] is bool:
-                words += [flag] if value else []
-            elif value is not None:
-                words += [flag, str(value)]
-        self._process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                                         text=True)
-        assert self._process.stdout is not None and self._process.stderr is not None
-        self.address = self._process.stdout.readline().strip()
-        if not self.address:
-            self._process.wait()
-            raise RuntimeError(self._process.stderr.read().strip())
+    def __init__(self, address: str, end: Callable[[], object]) -> None:
+        self.address = address
+        self._end = weakref.finalize(self, end)  # called once: by close, or when the view is gone
 
     def close(self) -> None:
-        """Ends the program."""
-        if self._process.poll() is None:
-            self._process.terminate()
-        self._process.communicate()
+        """Ends the view. A simulation that it showed goes on from the time reached; raises the
+        phyxel.Error that has ended the view before, if there was one."""
+        self._end()
 
     def __enter__(self) -> View:
         return self
@@ -63,15 +42,30 @@ class View:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __del__(self) -> None:
-        if hasattr(self, "_process"):
-            self.close()
-
     def __repr__(self) -> str:
-        return f"<phyxel.View at {self.address}>"
+        return f"<phyxel.View at {self.address}{'' if self._end.alive else ', closed'}>"
 
     def _repr_html_(self) -> str:
         return f'<iframe src="{self.address}" width="100%" height="900" style="border:0"></iframe>'
+
+
+def _words_of(scene, options):
+    """The command line of the program for a scene's file."""
+    found = program()
+    if found is None:
+        raise RuntimeError("phyxel.view: this module has no program beside it; allowed: one that "
+                           "\"pip install\" installed, or that of a build with the target "
+                           "phyxel_program")
+    words = [str(found), "view", os.fspath(scene)]
+    for name, value in {"port": 0, **options}.items():
+        if name not in _options:
+            raise TypeError(f"phyxel.view: {name}: unknown; allowed: {', '.join(_options)}")
+        flag = "--" + name.replace("_", "-")
+        if _options[name] is bool:
+            words += [flag] if value else []
+        elif value is not None:
+            words += [flag, str(value)]
+    return words
 
 
 def view(scene: str | os.PathLike[str] | dict[str, Any], **options: Any) -> View:
@@ -87,4 +81,26 @@ def view(scene: str | os.PathLike[str] | dict[str, Any], **options: Any) -> View
     Raises TypeError for another option, and RuntimeError with the program's message if it refuses
     the scene.
     """
-    return View(scene, **options)
+    folder = None
+    if isinstance(scene, dict):
+        from . import to_toml
+        folder = tempfile.TemporaryDirectory()  # as long as the view
+        file = pathlib.Path(folder.name) / "scene.toml"
+        file.write_text(to_toml(scene))
+        scene = file
+    process = subprocess.Popen(_words_of(scene, options), stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True)
+    assert process.stdout is not None and process.stderr is not None
+    address = process.stdout.readline().strip()
+    if not address:
+        process.wait()
+        raise RuntimeError(process.stderr.read().strip())
+
+    def end():
+        if process.poll() is None:
+            process.terminate()
+        process.communicate()
+        if folder:
+            folder.cleanup()
+
+    return View(address, end)
