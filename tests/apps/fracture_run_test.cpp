@@ -8,6 +8,7 @@
 
 #include "phyxel/recorder.hpp"
 #include "support/csv_column.hpp"
+#include "support/glb.hpp"
 #include "support/page.hpp"
 #include "support/program.hpp"
 #include "support/skips.hpp"
@@ -23,6 +24,18 @@ using ::testing::HasSubstr;
 
 class FractureOfRuns : public test::Program {
  protected:
+  /// Runs a notched plate that is pulled apart.
+  void tear_plate() {
+    write("scene.toml",
+          "[time]\nend = 0.04\n[output]\nframes_per_second = 250\nfields = ['broken', 'fragment']\n"
+          "[[body]]\nshape = 'block'\nsize = [0.8, 0.6, 0.12]\nspacing = 0.04\nlattice = 'cells'\n"
+          "[body.material]\nyoung = 1e6\npoisson = 0.25\ndensity = 1000\n"
+          "[body.fracture]\nenergy_release_rate = 50\n"
+          "[[body.notch]]\ncentre = [-0.4, 0.001, 0]\nnormal = [0, 1, 0]\nradius = 0.3\n"
+          "[[body.motion]]\nregion = 'y+'\nvelocity = [0, 1, 0]\n"
+          "[[body.motion]]\nregion = 'y-'\nvelocity = [0, -1, 0]\n");
+    ASSERT_EQ(run({"run", "scene.toml", "--out", "out", "--no-pictures"}).code, 0);
+  }
   /// The values of the column of energy.csv that begins with a name.
   std::vector<double> column(const std::string& name) const {
     return test::csv_column(text_of(folder_ / "out" / "energy.csv"), name);
@@ -113,17 +126,43 @@ TEST_F(FractureOfRuns, FragmentsAreTold) {
               HasSubstr("  fragments   2, the heaviest with 62.5% of the mass; no dust"));
 }
 
+/// A file of glTF draws, at each frame, the triangles that the frame has: those of nodes that have
+/// not vanished.
+TEST_F(FractureOfRuns, GltfOpensAsFramesDo) {
+  tear_plate();
+  const Outcome outcome = run({"export", "out", "--format", "glb", "--out", "plate.glb"});
+  ASSERT_EQ(outcome.code, 0) << outcome.err;
+  const test::Gltf gltf = test::read_glb(folder_ / "plate.glb");
+  const std::vector<SeriesEntry> frames = read_series(folder_ / "out" / "surface.hdf.series");
+  ASSERT_GT(frames.size(), 5u);
+  std::size_t vanishing = 0;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    std::multiset<Triangle> drawn;
+    for (std::size_t node = 0; node < gltf.json["nodes"].size(); ++node) {
+      if (!gltf.json["nodes"][node].contains("mesh")) continue;
+      const std::vector<float> scales = gltf.keyframes(node, "scale");
+      if (!scales.empty()) {
+        ASSERT_EQ(scales.size(), 3 * frames.size());
+        for (std::size_t e = 3 * k; e < 3 * k + 3; ++e) EXPECT_EQ(scales[e], scales[3 * k]);
+        EXPECT_TRUE(scales[3 * k] == 0 || scales[3 * k] == 1);
+        vanishing += scales[3 * k] == 0 ? 1 : 0;
+        if (scales[3 * k] == 0) continue;
+      }
+      const auto corners = gltf.values<std::uint32_t>(gltf.primitive(node)["indices"]);
+      for (std::size_t c = 0; c + 2 < corners.size(); c += 3) {
+        drawn.insert({static_cast<Index>(corners[c]), static_cast<Index>(corners[c + 1]),
+                      static_cast<Index>(corners[c + 2])});
+      }
+    }
+    const FrameData frame = read_frame(frames[k].file);
+    EXPECT_EQ(drawn, std::multiset<Triangle>(frame.triangle.begin(), frame.triangle.end())) << k;
+  }
+  EXPECT_GT(vanishing, 0u);
+}
+
 /// The page of a run draws, of each frame, the triangles that the frame has.
 TEST_F(FractureOfRuns, PagesOpenAsFramesDo) {
-  write("scene.toml",
-        "[time]\nend = 0.04\n[output]\nframes_per_second = 250\nfields = ['broken', 'fragment']\n"
-        "[[body]]\nshape = 'block'\nsize = [0.8, 0.6, 0.12]\nspacing = 0.04\nlattice = 'cells'\n"
-        "[body.material]\nyoung = 1e6\npoisson = 0.25\ndensity = 1000\n"
-        "[body.fracture]\nenergy_release_rate = 50\n"
-        "[[body.notch]]\ncentre = [-0.4, 0.001, 0]\nnormal = [0, 1, 0]\nradius = 0.3\n"
-        "[[body.motion]]\nregion = 'y+'\nvelocity = [0, 1, 0]\n"
-        "[[body.motion]]\nregion = 'y-'\nvelocity = [0, -1, 0]\n");
-  ASSERT_EQ(run({"run", "scene.toml", "--out", "out", "--no-pictures"}).code, 0);
+  tear_plate();
   const Outcome outcome = run({"report", "out", "-o", "page.html"});
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const std::string page = text_of(folder_ / "page.html");

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 
 #include "compose.hpp"
 #include "draw_obstacles.hpp"
@@ -51,6 +53,7 @@ struct BodySurface {
   Index body = 0;
   std::vector<std::size_t> surfel;                     ///< Numbers in the frame.
   std::vector<std::array<std::uint32_t, 3>> triangle;  ///< Of positions in `surfel`.
+  std::vector<std::size_t> number;                     ///< Numbers of the triangles in the frame.
   Vec3d origin;  ///< Of the coordinates of its vertices: the middle of its first frame [m].
   Floats position, normal, colour;         ///< Of the first frame; colours if a field is shown.
   Json attributes, targets, target_names;  ///< Accessors, and a name of each target.
@@ -79,10 +82,13 @@ std::vector<BodySurface> split_by_body(const FrameData& frame) {
     place[k] = static_cast<std::uint32_t>(body.surfel.size());
     body.surfel.push_back(k);
   }
-  for (const Triangle& corners : frame.triangle) {
+  for (std::size_t t = 0; t < frame.triangle.size(); ++t) {
+    const Triangle& corners = frame.triangle[t];
     std::array<std::uint32_t, 3> triangle;
     for (std::size_t c = 0; c < 3; ++c) triangle[c] = place[static_cast<std::size_t>(corners[c])];
-    body_at(static_cast<std::size_t>(corners[0])).triangle.push_back(triangle);
+    BodySurface& body = body_at(static_cast<std::size_t>(corners[0]));
+    body.triangle.push_back(triangle);
+    body.number.push_back(t);
   }
   std::erase_if(bodies, [](const BodySurface& body) { return body.triangle.empty(); });
   return bodies;
@@ -137,6 +143,13 @@ class Animation {
     add_channel(add_sampler(file_.add_keyframes(rotations, "VEC4")), node, "rotation");
   }
 
+  /// Lets a node vanish after a frame, by a scale of zero. @param last number of the frame
+  void add_end(std::size_t node, std::size_t last) {
+    std::vector<float> scales(3 * frames_, 0);
+    std::fill_n(scales.begin(), 3 * (last + 1), 1.0F);
+    add_channel(add_sampler(file_.add_keyframes(scales, "VEC3"), "STEP"), node, "scale");
+  }
+
   /// Adds the animation to the file, if anything moves.
   void finish() {
     if (channels_.empty()) return;
@@ -144,8 +157,8 @@ class Animation {
   }
 
  private:
-  std::size_t add_sampler(std::size_t output) {
-    samplers_.push_back({{"input", times_}, {"interpolation", "LINEAR"}, {"output", output}});
+  std::size_t add_sampler(std::size_t output, const char* interpolation = "LINEAR") {
+    samplers_.push_back({{"input", times_}, {"interpolation", interpolation}, {"output", output}});
     return samplers_.size() - 1;
   }
   void add_channel(std::size_t sampler, std::size_t node, const char* path) {
@@ -174,6 +187,7 @@ class Exporter {
       throw InputError(fmt::format("{}: has no triangles", shots_.front().surface.string()));
     }
     bodies_ = split_by_body(first_);
+    last_.assign(first_.triangle.size(), never);
     obstacles_ = obstacles_of_frames(first_.scene, request.scene_folder);
     choose();
     if (!request.colours.field.empty()) {
@@ -185,7 +199,7 @@ class Exporter {
 
   GltfExport made() {
     const std::vector<float> times = animation_times();
-    for (const std::size_t shot : chosen_) add_frame(shot);
+    for (std::size_t k = 0; k < chosen_.size(); ++k) add_frame(k);
     Animation animation(file_, times);
     add_nodes(animation);
     animation.finish();
@@ -246,14 +260,22 @@ class Exporter {
     return times;
   }
 
-  /// Reads a frame, and checks that its triangles are those of the first one.
-  FrameData read(const fs::path& file) const {
+  /// Reads a chosen frame, and notes its triangles: those of the first frame, but for some that
+  /// cracks have crossed since.
+  FrameData read(std::size_t number) {
+    const fs::path& file = shots_[chosen_[number]].surface;
     FrameData frame = read_frame(file, colouring_.has_value());
-    if (frame.triangle != first_.triangle || frame.point.size() != first_.point.size() ||
+    std::size_t found = 0;
+    for (std::size_t t = 0; t < last_.size() && found < frame.triangle.size(); ++t) {
+      if (frame.triangle[found] != first_.triangle[t]) continue;
+      last_[t] = number;
+      ++found;
+    }
+    if (found < frame.triangle.size() || frame.point.size() != first_.point.size() ||
         frame.body != first_.body) {
       throw InputError(fmt::format(
-          "{}: has other points or triangles than the first frame, as those of bodies that break; "
-          "allowed: frames that share them (--frames), --format vtu, or USD from Python",
+          "{}: has other points or triangles than the first frame; allowed: frames that share "
+          "them (--frames), --format vtu, or USD from Python",
           file.string()));
     }
     if (frame.normal.empty()) frame.normal = vertex_normals(frame.point, frame.triangle);
@@ -275,10 +297,10 @@ class Exporter {
     return colours;
   }
 
-  void add_frame(std::size_t shot) {
-    const FrameData frame = read(shots_[shot].surface);
+  void add_frame(std::size_t number) {
+    const FrameData frame = read(number);
     std::vector<Vec3d> colours;
-    if (colouring_) colours = colours_of(frame, shots_[shot].phyxels);
+    if (colouring_) colours = colours_of(frame, shots_[chosen_[number]].phyxels);
     for (BodySurface& body : bodies_) {
       std::vector<Vec3d> positions = some(frame.point, body.surfel);
       if (body.attributes.empty()) body.origin = to<double>(to<float>(middle_of(positions).first));
@@ -304,11 +326,7 @@ class Exporter {
 
   void add_nodes(Animation& animation) {
     Json children = Json::array();
-    for (BodySurface& body : bodies_) {
-      const std::size_t node = add_body(body);
-      animation.add_weights(node);
-      children.push_back(node);
-    }
+    for (BodySurface& body : bodies_) add_body(body, animation, children);
     const RigidPaths paths(shots_.front().surface.parent_path());
     for (const Obstacle& obstacle : obstacles_) {
       children.push_back(add_obstacle(obstacle, paths, animation));
@@ -327,22 +345,39 @@ class Exporter {
     file_.add("scenes", {{"name", name}, {"nodes", Json::array({root})}});
   }
 
-  std::size_t add_body(BodySurface& body) {
+  /// Adds a body: a node of the triangles that last, and a node for those that vanish after the
+  /// same frame. All share the vertices and their targets.
+  void add_body(BodySurface& body, Animation& animation, Json& children) {
     const std::string name = fmt::format("body {}", body.body + 1);
     const Colour colour = colouring_ ? Colour{1, 1, 1} : body_colour(body.body);
-    Json primitive{{"attributes", body.attributes},
-                   {"indices", file_.add_triangles(body.triangle)},
-                   {"material", file_.add("materials", material_of(name, colour, 0.6))}};
-    Json mesh{{"name", name}};
-    if (!body.targets.empty()) {
-      primitive["targets"] = std::move(body.targets);
-      mesh["weights"] = std::vector<int>(body.target_names.size(), 0);
-      mesh["extras"] = {{"targetNames", std::move(body.target_names)}};
+    const std::size_t material = file_.add("materials", material_of(name, colour, 0.6));
+    std::map<std::size_t, std::vector<std::array<std::uint32_t, 3>>> by_end;
+    for (std::size_t t = 0; t < body.triangle.size(); ++t) {
+      const std::size_t last = last_[body.number[t]];
+      if (last != never) by_end[last].push_back(body.triangle[t]);
     }
-    mesh["primitives"].push_back(std::move(primitive));
-    const std::size_t number = file_.add("meshes", std::move(mesh));
-    return file_.add("nodes",
-                     {{"name", name}, {"mesh", number}, {"translation", json_of(body.origin)}});
+    for (auto end = by_end.rbegin(); end != by_end.rend(); ++end) {
+      const auto& [last, triangles] = *end;
+      const bool vanishes = last + 1 < chosen_.size();
+      const std::string of_part =
+          vanishes ? fmt::format("{} until t = {:g} s", name, shots_[chosen_[last]].time) : name;
+      Json primitive{{"attributes", body.attributes},
+                     {"indices", file_.add_triangles(triangles)},
+                     {"material", material}};
+      Json mesh{{"name", of_part}};
+      if (!body.targets.empty()) {
+        primitive["targets"] = body.targets;
+        mesh["weights"] = std::vector<int>(body.target_names.size(), 0);
+        mesh["extras"] = {{"targetNames", body.target_names}};
+      }
+      mesh["primitives"].push_back(std::move(primitive));
+      const std::size_t number = file_.add("meshes", std::move(mesh));
+      const std::size_t node = file_.add(
+          "nodes", {{"name", of_part}, {"mesh", number}, {"translation", json_of(body.origin)}});
+      animation.add_weights(node);
+      if (vanishes) animation.add_end(node, last);
+      children.push_back(node);
+    }
   }
 
   std::size_t add_obstacle(const Obstacle& obstacle, const RigidPaths& paths,
@@ -404,6 +439,8 @@ class Exporter {
   std::vector<Shot> shots_;
   FrameData first_;
   std::vector<BodySurface> bodies_;
+  static constexpr std::size_t never = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> last_;  // chosen frame that draws each triangle last, or never
   std::vector<Obstacle> obstacles_;
   std::vector<std::size_t> chosen_;
   std::optional<Colouring> colouring_;
