@@ -105,6 +105,37 @@ def test_triangles_change_where_those_of_the_frames_do(run, tmp_path):
     assert mesh.GetFaceVertexIndicesAttr().GetTimeSamples() == [0, 2, 4]  # only where they change
 
 
+def test_obstacles_are_where_they_were(tmp_path):
+    """A plane that rises, and a free ball that flies and spins, as the run's own log has it."""
+    Usd, UsdGeom = usd()
+    obstacles = [{"name": "floor", "shape": "plane", "translation": [0, 0, -9], "motion": {"velocity": [0, 0, -3]}},
+                 {"name": "ball", "shape": "sphere", "radius": 0.5, "density": 1000, "translation": [5, 1e5, 2], "velocity": [0, 4, 0], "spin": [0, 0, 30]},
+                 {"name": "wall", "shape": "box", "size": [1, 2, 3], "translation": [-9, 0, 0]}]
+    run = phyxel.run({**SCENE, "obstacle": obstacles}, tmp_path / "run")
+    stage = Usd.Stage.Open(str(phyxel.to_usd(run, tmp_path / "run.usda")))
+    log = run.rigid_bodies["ball"]
+    for k, time in enumerate(run.times):
+        placed = {}
+        for number, obstacle in enumerate(obstacles, 1):
+            prim = stage.GetPrimAtPath(f"/phyxel/obstacle_{number}")
+            assert prim.GetCustomDataByKey("name") == obstacle["name"]
+            mesh = UsdGeom.Mesh(stage.GetPrimAtPath(f"/phyxel/obstacle_{number}/surface"))
+            matrix = np.array(mesh.ComputeLocalToWorldTransform(k))
+            placed[obstacle["name"]] = np.array(mesh.GetPointsAttr().Get()) @ matrix[:3, :3] + matrix[3, :3], matrix
+        points, matrix = placed["ball"]
+        centre = [log[f"place_{axis}"][k] for axis in "xyz"]
+        assert np.linalg.norm(points - centre, axis=1) == pytest.approx(0.5, abs=1e-6)
+        assert centre[1] == pytest.approx(1e5 + 4 * time, rel=1e-9)
+        # The x axis has turned about z, by spin times time but for the run's own steps; quaternions are in single precision.
+        turn = log["rotation_z"][k]
+        assert turn == pytest.approx(30 * time, rel=0.01)
+        assert matrix[0, :3] == pytest.approx([np.cos(turn), np.sin(turn), 0], abs=1e-5)
+        assert placed["floor"][0][:, 2] == pytest.approx(-9 - 3 * time, abs=1e-6)
+        assert np.ptp(placed["wall"][0], axis=0) == pytest.approx([1, 2, 3], abs=1e-6)
+    wall = UsdGeom.Xformable(stage.GetPrimAtPath("/phyxel/obstacle_3"))
+    assert not any(op.GetTimeSamples() for op in wall.GetOrderedXformOps())  # it stands still
+
+
 def test_a_stage_obeys_the_rules_of_usd(run, tmp_path):
     Usd, _ = usd()
     validation = pytest.importorskip("pxr.UsdValidation", reason="missing tool: validators of USD")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy
 
-from ._phyxel import Frame, InputError, body_colour
+from ._phyxel import Frame, InputError, body_colour, obstacles_of
 
 if TYPE_CHECKING:
     from . import Trajectory
@@ -110,6 +110,46 @@ class _Stage:
             if len(body.surfels):  # inside the surface: shown on request
                 body.points.CreatePurposeAttr(self.geom.Tokens.guide)
 
+    def add_obstacles(self, folder: pathlib.Path, times: numpy.ndarray, codes: numpy.ndarray) -> None:
+        """Adds the obstacles of the run, each with its place and turn at the frames."""
+        frame = self.phyxels if self.surface is None else self.surface
+        low, high = frame.points.min(axis=0), frame.points.max(axis=0)
+        reach = 2 * float(numpy.linalg.norm(high - low))
+        for k, obstacle in enumerate(obstacles_of(frame, folder, list(times), 0.5 * (low + high), reach)):
+            path = f"/phyxel/obstacle_{k + 1}"
+            place = self.geom.Xform.Define(self.stage, path)
+            place.GetPrim().SetCustomDataByKey("name", obstacle["name"])
+            self._place(place, obstacle, codes)
+            mesh = self.geom.Mesh.Define(self.stage, path + "/surface")
+            points, triangles = self._array("Vec3fArray", obstacle["points"]), obstacle["triangles"]
+            mesh.CreatePointsAttr(points)
+            mesh.CreateExtentAttr(self.geom.PointBased.ComputeExtent(points))
+            mesh.CreateFaceVertexCountsAttr(self._array("IntArray", numpy.full(len(triangles), 3)))
+            mesh.CreateFaceVertexIndicesAttr(self._array("IntArray", triangles.ravel()))
+            mesh.CreateSubdivisionSchemeAttr(self.geom.Tokens.none)
+            mesh.CreateDoubleSidedAttr(True)
+            if len(obstacle["normals"]):
+                mesh.CreateNormalsAttr(self._array("Vec3fArray", obstacle["normals"]))
+                mesh.SetNormalsInterpolation(self.geom.Tokens.vertex)
+            mesh.CreateDisplayColorAttr(self.vt.Vec3fArray([self.gf.Vec3f(*obstacle["colour"])]))
+
+    def _place(self, prim, obstacle, codes):
+        """Sets the place and the turn of an obstacle: once if it stands still, else at each frame."""
+        translate, orient = prim.AddTranslateOp(), prim.AddOrientOp()
+        before = None
+        for code, place, turn in zip(codes, obstacle["place"], obstacle["turn"]):
+            # USD multiplies rows by matrices.
+            quaternion = self.gf.Matrix3d(*map(float, turn.T.ravel())).ExtractRotation().GetQuat()
+            if before is not None and self.gf.Dot(before, quaternion) < 0:
+                quaternion = -quaternion  # on the shorter way
+            before = quaternion
+            still = numpy.ptp(obstacle["place"], axis=0).max() == 0 and numpy.ptp(obstacle["turn"], axis=0).max() == 0
+            at = () if still else (float(code),)
+            translate.Set(self.gf.Vec3d(*map(float, place)), *at)
+            orient.Set(self.gf.Quatf(quaternion), *at)
+            if still:
+                return
+
     def _set_triangles(self, body, frame, *code):
         """Sets the triangles of a body, at a time code if one is given."""
         position = numpy.full(len(frame), -1)
@@ -175,8 +215,8 @@ def to_usd(run: Trajectory | str | os.PathLike[str], out: str | os.PathLike[str]
 
     Each body is an Xform with a Mesh `surface` and Points `phyxels`, whose positions, normals and
     extents have a time sample for each frame; fields of the frames are primvars, stress and strain
-    with one for each component. Phyxels inside a surface have the purpose "guide". Lengths are in
-    metres. Needs usd-core.
+    with one for each component. Phyxels inside a surface have the purpose "guide". Each obstacle is an
+    Xform with a Mesh `surface`, placed at each frame. Lengths are in metres. Needs usd-core.
 
     run: a Trajectory, or the folder of a run.
     out: the file, .usdc (binary), .usda (text) or .usd.
@@ -221,6 +261,7 @@ def _write(file, trajectory, up, rate, fps, codes):
         surface, phyxels = frame(trajectory.surface, k), frame(trajectory.phyxels, k)
         if stage is None:
             stage = _Stage(file, surface, phyxels, up, rate, fps, codes)
+            stage.add_obstacles(trajectory.directory, trajectory.times, codes)
         for now, first in (surface, stage.surface), (phyxels, stage.phyxels):
             if now is not None and len(now) != len(first):
                 raise InputError(f"{trajectory.directory}: frame {k} has {len(now)} points, the first "
