@@ -47,11 +47,17 @@ CameraWishes with_options(CameraWishes scene, const CameraOptions& options) {
   return scene;
 }
 
-Index body_called(const std::string& name, const std::string& scene,
-                  const std::filesystem::path& file) {
+std::optional<Index> body_called(const std::string& name, const std::string& scene,
+                                 const std::filesystem::path& file) {
   std::vector<std::string> names;
+  std::size_t soft = 0;
   try {
-    for (const BodyRequest& body : parse_scene(scene, file).bodies) names.push_back(body.name);
+    const Scene read = parse_scene(scene, file);
+    for (const BodyRequest& body : read.bodies) names.push_back(body.name);
+    soft = names.size();
+    for (const ObstacleRequest& obstacle : read.obstacles) {
+      if (obstacle.density) names.push_back(obstacle.name);
+    }
   } catch (const InputError& error) {
     throw InputError(
         fmt::format("the camera follows \"{}\", but the scene in the frames cannot be read: {}; "
@@ -59,7 +65,9 @@ Index body_called(const std::string& name, const std::string& scene,
                     name, error.what()));
   }
   const auto found = std::find(names.begin(), names.end(), name);
-  if (found != names.end()) return static_cast<Index>(found - names.begin());
+  const auto place = static_cast<std::size_t>(found - names.begin());
+  if (place < soft) return static_cast<Index>(place);
+  if (place < names.size()) return std::nullopt;
   if (names.size() > 8) {
     names.resize(8);
     names.emplace_back("...");
@@ -82,9 +90,15 @@ std::optional<Vec3d> centre_of(const FrameData& frame, Index body) {
 }
 
 FollowedBody::FollowedBody(std::string name, const std::string& scene,
-                           const std::filesystem::path& file)
-    : name_(std::move(name)) {
+                           const std::filesystem::path& file, RigidPaths paths)
+    : name_(std::move(name)), paths_(std::move(paths)) {
   if (!name_.empty()) body_ = body_called(name_, scene, file);
+}
+
+std::optional<Vec3d> FollowedBody::centre_in(const FrameData& frame) const {
+  if (body_) return centre_of(frame, *body_);
+  const std::optional<RigidState> rigid = paths_.nearest(name_, frame.time);
+  return rigid ? std::optional(rigid->place) : std::nullopt;
 }
 
 void FollowedBody::add(const FrameData* surface, const FrameData* phyxels) {
@@ -93,7 +107,12 @@ void FollowedBody::add(const FrameData* surface, const FrameData* phyxels) {
     return;
   }
   const FrameData* frame = phyxels != nullptr ? phyxels : surface;
-  const auto centre = frame != nullptr ? centre_of(*frame, body_) : std::nullopt;
+  const auto centre = frame != nullptr ? centre_in(*frame) : std::nullopt;
+  if (!centre && !body_) {
+    throw InputError(fmt::format(
+        "--follow {}: rigid.csv beside the frames lacks it; allowed: the folder of a whole run",
+        name_));
+  }
   if (!centre) {
     throw InputError(fmt::format(
         "--follow {}: frame {} has no point of it; allowed: a body that the frames hold", name_,

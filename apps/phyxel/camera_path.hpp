@@ -10,6 +10,7 @@
 #include "phyxel/camera_request.hpp"
 #include "phyxel/recorder.hpp"
 #include "phyxel/scene.hpp"
+#include "rigid_paths.hpp"
 #include "trajectory.hpp"
 
 namespace phyxel::app {
@@ -36,10 +37,11 @@ CameraWishes camera_wishes(const std::string& scene, const std::filesystem::path
 /// @throws InputError for a view beside a position and a target, or for a target at the position
 CameraWishes with_options(CameraWishes scene, const CameraOptions& options);
 
-/// The number of a body by its name. @param scene text of the frames' scene
+/// The number of a body by its name; unset for the name of an obstacle that is a free rigid body.
+/// @param scene text of the frames' scene
 /// @throws InputError if the scene cannot be read, or has no such body
-Index body_called(const std::string& name, const std::string& scene,
-                  const std::filesystem::path& file);
+std::optional<Index> body_called(const std::string& name, const std::string& scene,
+                                 const std::filesystem::path& file);
 
 /// The mean of the points of a body in a frame [m]; unset if it has none.
 std::optional<Vec3d> centre_of(const FrameData& frame, Index body);
@@ -47,15 +49,23 @@ std::optional<Vec3d> centre_of(const FrameData& frame, Index body);
 /// The way of a followed body's centre since the first frame [m], frame by frame.
 class FollowedBody {
  public:
-  /// @param name of the body; "": nothing is followed, and all ways are zero
-  FollowedBody(std::string name, const std::string& scene, const std::filesystem::path& file);
-  /// Adds the next frame: its phyxels, or else its surface. @throws InputError without points
+  /// @param name of the body, or of a free rigid body; "": nothing is followed, and all ways are
+  ///   zero
+  /// @param paths of the free rigid bodies
+  FollowedBody(std::string name, const std::string& scene, const std::filesystem::path& file,
+               RigidPaths paths = {});
+  /// Adds the next frame: its phyxels, or else its surface. @throws InputError without points of
+  /// the
+  ///   body, or a path of the rigid body
   void add(const FrameData* surface, const FrameData* phyxels);
   Vec3d way(std::size_t frame) const { return way_[frame]; }
 
  private:
+  std::optional<Vec3d> centre_in(const FrameData& frame) const;
+
   std::string name_;
-  Index body_ = 0;
+  std::optional<Index> body_;  // unset: a rigid one
+  RigidPaths paths_;
   std::optional<Vec3d> start_;  // of the centre [m]
   std::vector<Vec3d> way_;
 };

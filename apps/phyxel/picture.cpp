@@ -60,7 +60,8 @@ class Stage {
     const fs::path& start =
         shots.front().surface.empty() ? shots.front().phyxels : shots.front().surface;
     const std::string scene = scene_text(start);
-    followed_.emplace(wishes.camera.follow, scene, request.scene_folder / "scene.toml");
+    followed_.emplace(wishes.camera.follow, scene, request.scene_folder / "scene.toml",
+                      RigidPaths(start.parent_path()));
     setting_.time_decimals = time_decimals(shots);
     setting_.up = wishes.up;
     setting_.obstacles = obstacles_of_frames(scene, request.scene_folder);

@@ -125,9 +125,10 @@ void add_camera_options(CLI::App& command, RenderOptions& options) {
           "first picture to the last [degrees] (default: the scene's); a video of one frame "
           "then takes four seconds")
       ->check(CLI::Range(-36000.0, 36000.0));
-  command.add_option(
-      "--follow", camera.follow,
-      "Name of a body that the camera moves with (default: the scene's; '' for none)");
+  command.add_option("--follow", camera.follow,
+                     "Name of a body, or of a free rigid one, that the camera moves with (default: "
+                     "the scene's; '' "
+                     "for none)");
 }
 
 }  // namespace

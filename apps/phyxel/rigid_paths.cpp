@@ -38,9 +38,9 @@ std::map<double, RigidState> RigidPaths::of(const Obstacle& obstacle) const {
   return found == states_.end() ? std::map<double, RigidState>{} : found->second;
 }
 
-ObstacleStep RigidPaths::at(const Obstacle& obstacle, double time) const {
-  const auto found = states_.find(obstacle.name);
-  if (!obstacle.free || found == states_.end()) return obstacle.step_from(time, 0);
+std::optional<RigidState> RigidPaths::nearest(const std::string& name, double time) const {
+  const auto found = states_.find(name);
+  if (found == states_.end() || found->second.empty()) return std::nullopt;
   const std::map<double, RigidState>& states = found->second;
   auto next = states.lower_bound(time);
   if (next == states.end()) --next;
@@ -48,7 +48,12 @@ ObstacleStep RigidPaths::at(const Obstacle& obstacle, double time) const {
     const auto before = std::prev(next);
     if (time - before->first < next->first - time) next = before;
   }
-  return obstacle.placed(next->second);
+  return next->second;
+}
+
+ObstacleStep RigidPaths::at(const Obstacle& obstacle, double time) const {
+  const auto state = obstacle.free ? nearest(obstacle.name, time) : std::nullopt;
+  return state ? obstacle.placed(*state) : obstacle.step_from(time, 0);
 }
 
 }  // namespace phyxel::app

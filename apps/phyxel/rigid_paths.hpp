@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "phyxel/model.hpp"
@@ -19,6 +20,9 @@ class RigidPaths {
   /// Where an obstacle is at a time [s]: a free body where it was at the nearest frame, or at the
   /// start if nothing is known of it.
   ObstacleStep at(const Obstacle& obstacle, double time) const;
+  /// The state of a free body at the frame nearest to a time [s], by the name of the obstacle;
+  /// unset if nothing is known of it.
+  std::optional<RigidState> nearest(const std::string& name, double time) const;
   /// All places of the centre of an obstacle, by time.
   std::map<double, RigidState> of(const Obstacle& obstacle) const;
 

@@ -149,16 +149,24 @@ RenderRequest render_of(const SceneTable& root, Vec3d gravity) {
   return root.has("render") ? read_render(root.table("render"), gravity) : default_render(gravity);
 }
 
-/// Refuses a camera that follows a body that the scene lacks.
-void check_followed(const SceneTable& root, const std::vector<BodyRequest>& bodies) {
+/// Refuses a camera that follows what is neither a body nor a free rigid body of the scene.
+void check_followed(const SceneTable& root, const Scene& scene) {
   if (!root.has("render")) return;
   const SceneTable render = root.table("render");
   const std::string followed = read_camera(render).follow;
-  const auto is_it = [&](const BodyRequest& body) { return body.name == followed; };
-  if (followed.empty() || std::any_of(bodies.begin(), bodies.end(), is_it)) return;
+  if (followed.empty()) return;
+  std::string allowed = names_of(scene.bodies);
+  bool known = std::any_of(scene.bodies.begin(), scene.bodies.end(),
+                           [&](const BodyRequest& body) { return body.name == followed; });
+  for (const ObstacleRequest& obstacle : scene.obstacles) {
+    if (!obstacle.density) continue;
+    known = known || obstacle.name == followed;
+    allowed += ", " + in_quotes(obstacle.name);
+  }
+  if (known) return;
   render.table("camera").refuse(
-      "follow", fmt::format("{} found, which no body is called; allowed: {}", in_quotes(followed),
-                            names_of(bodies)));
+      "follow",
+      fmt::format("{} found, which no body is called; allowed: {}", in_quotes(followed), allowed));
 }
 
 std::vector<BodyRequest> read_bodies(const SceneTable& root) {
@@ -224,7 +232,7 @@ Scene parse_scene(const std::string& text, const std::filesystem::path& file) {
   if (root.has("contact")) scene.contact = read_contact(root.table("contact"), scene.bodies);
   check_penalties(scene);
   naming(scene, [&] { read_probes(root, scene.bodies); });
-  check_followed(root, scene.bodies);
+  check_followed(root, scene);
   return scene;
 }
 

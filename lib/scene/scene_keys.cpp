@@ -182,7 +182,7 @@ std::vector<SceneKey> run_keys() {
       {.section = "render.camera", .name = "orbit", .unit = "degrees", .fallback = "0",
        .range = between(-36000, 36000), .meaning = "Angle by which the camera turns about `up` around its target, from the first picture to the last. A report opens without a turn."},
       {.section = "render.camera", .name = "follow", .type = KeyType::text, .otherwise = "none",
-       .meaning = "Name of a body: camera and target move with the centre of its points, from where they are at the first frame."},
+       .meaning = "Name of a body: camera and target move with the centre of its points, or of mass of a free rigid body, from where they are at the first frame."},
   };
 }
 

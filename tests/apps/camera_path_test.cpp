@@ -4,6 +4,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
+
 #include "ball.hpp"
 #include "png_reader.hpp"
 #include "report/opening_view.hpp"
@@ -157,6 +160,35 @@ TEST(FollowedBody, HasTheWayOfItsCentre) {
   frame.body = {0, 0, 0, 0};
   EXPECT_THAT(message_of([&] { body.add(nullptr, &frame); }),
               HasSubstr("--follow b: frame 2 has no point of it"));
+}
+
+TEST(FollowedBody, HasTheWayOfARigidOne) {
+  const auto folder = std::filesystem::temp_directory_path() / "phyxel_followed_rigid";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / "rigid.csv")
+      << "time [s],step,obstacle,place_x [m],place_y [m],place_z [m],rotation_x [rad],"
+         "rotation_y [rad],rotation_z "
+         "[rad]\n0,0,\"ball\",1,2,3,0,0,0\n0.5,10,\"ball\",1,2,5,0,0,1\n";
+  const std::string scene =
+      "[time]\nend = 1\n[[body]]\nname = 'soft'\ncloud = 'a'\nmaterial = { young = 1, poisson = "
+      "0.3, density = 1 }\n[[obstacle]]\nname = 'ball'\nshape = 'sphere'\nradius = 1\ndensity = "
+      "9\n[[obstacle]]\nname = 'wall'\nshape = 'plane'\n";
+  EXPECT_FALSE(body_called("ball", scene, "scene.toml"));
+  EXPECT_THAT(message_of([&] { body_called("wall", scene, "scene.toml"); }),
+              HasSubstr("--follow wall: no body is called that; allowed: soft, ball"));
+  FollowedBody ball("ball", scene, "scene.toml", RigidPaths(folder));
+  FrameData frame;
+  frame.point = {{7, 7, 7}};
+  for (const double time : {0.0, 0.49}) {
+    frame.time = time;
+    ball.add(&frame, nullptr);
+  }
+  expect_near(ball.way(0), {0, 0, 0});
+  expect_near(ball.way(1), {0, 0, 2});
+  FollowedBody unknown("ball", scene, "scene.toml");
+  EXPECT_THAT(message_of([&] { unknown.add(&frame, nullptr); }),
+              HasSubstr("--follow ball: rigid.csv beside the frames lacks it"));
+  std::filesystem::remove_all(folder);
 }
 
 TEST(OpeningView, IsThatOfTheScene) {

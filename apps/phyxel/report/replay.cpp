@@ -280,7 +280,7 @@ class Replay {
   std::vector<Instance> read_instances() {
     std::vector<Instance> instances;
     if (!camera_.camera.follow.empty()) {
-      followed_.emplace(camera_.camera.follow, any().scene, run_.scene_file());
+      followed_.emplace(camera_.camera.follow, any().scene, run_.scene_file(), RigidPaths(folder_));
     }
     for (const std::size_t shot : chosen_) {
       Instance& instance = instances.emplace_back();
