@@ -149,7 +149,7 @@ class SimulationBase:
         """What the scene's probes read now: {name: dict}, each as of at()."""
     def surface(self) -> tuple[NDArray[Any], NDArray[Any]]:
         """Deformed surfels [m] and their normals, both (m, 3), copies."""
-    def surface_fields(self, names: list[str]) -> dict[str, NDArray[Any]]:
+    def surface_fields(self, names: list[str]) -> dict[str, Any]:
         """Fields on the deformed surfels by the names of output.fields, as frames of the surface
         have them: {name: array}, (m,), (m, 3) or (m, 6), copies; "history" is all that the
         materials remember."""
@@ -226,6 +226,12 @@ def body_colour(body: int) -> tuple[float, float, float]:
 
 def inspect(mesh: Mesh) -> str:
     """Describes the defects of a surface in one line."""
+
+def obstacles_of(frame: Frame, folder: Path, times: list[float], middle: tuple[float, float, float], reach: float) -> list[dict[str, Any]]:
+    """Obstacles of a run, by a frame and the folder: a list of dicts, one for each: name, points,
+    normals (empty for flat faces) and triangles of its surface in its own coordinates [m],
+    place [m], (k, 3), and turn, (k, 3, 3), at times [s], and colour. A plane is a square of
+    twice the reach [m] opposite the middle of the bodies [m]."""
 
 def read_body(file: Path) -> Cloud:
     """Reads a body file as `phyxel sample` writes it."""
