@@ -45,6 +45,8 @@ TEST_F(Mpirun, RepeatsASessionOnAnyNumberOfRanks) {
 double seconds_of_children(pid_t parent) {
   double ticks = 0;
   for (const auto& process : std::filesystem::directory_iterator("/proc")) {
+    const std::string name = process.path().filename();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
     std::ifstream file(process.path() / "stat");
     std::string text((std::istreambuf_iterator<char>(file)), {});
     const std::size_t name_end = text.rfind(')');
