@@ -390,6 +390,15 @@ TEST_F(Reports, ABrowserCutsBodiesOpen) {
   EXPECT_EQ(share(before, "drawn"), share(whole, "drawn"));
   const std::string beyond = seen_by_browser(folder_, "page.html#t=0&obstacles=off&cut=y:99");
   EXPECT_EQ(share(beyond, "drawn"), 0);
+  // The same plane by its normal, of any length; and one across an edge of the beam, whose place in
+  // metres is along the normal of length 1.
+  const std::string by_normal = seen_by_browser(folder_, "page.html#t=0&obstacles=off&cut=0,3,0");
+  EXPECT_EQ(share(by_normal, "faces"), share(cut, "faces"));
+  EXPECT_EQ(share(by_normal, "drawn"), share(cut, "drawn"));
+  const std::string oblique = seen_by_browser(folder_, "page.html#t=0&obstacles=off&cut=1,1,0");
+  EXPECT_GT(share(oblique, "faces"), 0);
+  EXPECT_LT(share(oblique, "faces"), share(cut, "faces"));
+  EXPECT_LT(share(oblique, "drawn"), share(whole, "drawn"));
 }
 
 }  // namespace

@@ -38,6 +38,7 @@ Json opening_view(const CameraWishes& wishes, const std::vector<Instance>& insta
   view = {{"yaw", std::atan2(along(1), along(0))},
           {"pitch", std::atan2(along(2), std::hypot(along(0), along(1)))},
           {"field_of_view", camera.field_of_view},
+          {"orbit", camera.orbit},
           {"centred", camera.position || camera.target}};
   if (camera.position) {
     // Without a target, the view turns around the point ahead that is nearest to the centre.

@@ -84,6 +84,9 @@ const source = {
   span,
   upload,
   about() { return data.follow?.[shown.frame]; },
+  phyxelAt(frame, i) { return [0, 1, 2].map(k => frame.phyxels.points[3 * i + k] * data.scale[k] + data.low[k]); },
+  /// The value of a phyxel as shaders have it.
+  valueAt(frame, i) { return (shown.field < 0 ? bodiesOf('phyxels') : frame.phyxels.fields[shown.field])[i] / 65535; },
   corners(frame) { return cornersOf(frame.number); },
   torn(frame) { return {count: tornOf(frame).length, buffer: buffers.torn}; },
   bindSurface() {
@@ -238,7 +241,7 @@ if (data.timing.length) addTiming();
 else document.getElementById('timing-title').hidden = true;
 if (gl) prepare();
 else stage.append(element('p', {class: 'refusal'}, 'This browser has no WebGL 2, which the moving picture needs; the plots below do not.'));
-const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&cut=y:0.1&play&video
+const asked = new URLSearchParams(location.hash.slice(1));  // #t=0.5&colours=speed&obstacles=off&cut=y:0.1&play&video&orbit=90
 const colouring = asked.get('colours');
 if (colouring === 'bodies') shown.field = -1;
 else if (data.fields.some(f => f.name === colouring)) shown.field = data.fields.findIndex(f => f.name === colouring);

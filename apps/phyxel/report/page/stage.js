@@ -133,6 +133,7 @@ function attribute(k, buffer, size, type, normalised) {
 }
 
 const dot3 = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+const cross3 = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 /// A vector along the rows of a matrix.
 function turnedBy(rows, v) { return rows.map(row => dot3(row, v)); }
 
@@ -145,10 +146,10 @@ const middle = [0, 1].map(axis => {
   const all = outermost.map(p => p[axis]);
   return data.view.centred ? 0 : (Math.min(...all) + Math.max(...all)) / 2;
 });
+/// The distance from which some points are seen. points: right, up, backwards
+const distanceToSee = (points, aspect) => Math.max(...points.map(([x, y, z]) => z + 1.06 * focal(aspect) * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
 /// The distance of the first view: the scene's, or that from which all of them are seen.
-function firstDistance(aspect) {
-  return data.view.distance ?? Math.max(...outermost.map(([x, y, z]) => z + 1.06 * focal(aspect) * Math.max(Math.abs(x - middle[0]) / aspect, Math.abs(y - middle[1]))));
-}
+function firstDistance(aspect) { return data.view.distance ?? distanceToSee(outermost, aspect); }
 
 /// Rows: right, up, backwards. Yaw and pitch are about data.axes, the last of which is up.
 function matrix(from) {
@@ -301,7 +302,7 @@ function pixelsOfStage() {
 
 /// The share of the stage that faces of a cut take.
 function facesShare() {
-  if (cutting.axis < 0) return 0;
+  if (!cutting.normal) return 0;
   const full = pixelsOfStage();
   cutting.faces = false;
   draw();

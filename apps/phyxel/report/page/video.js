@@ -26,6 +26,22 @@ function copyStage(to) {
   for (const tick of legend.querySelectorAll('.ticks span')) write(tick, 'center');
 }
 
+// How far the camera turns about the upward direction during a video [degrees], as by `phyxel render --orbit`.
+const orbit = document.getElementById('orbit');
+orbit.value = Number(asked.get('orbit') ?? data.view.orbit);
+
+/// A function that turns the view to a share of the orbit, from so far that all of it holds what the present view would.
+function orbiting() {
+  const start = {...view}, degrees = Number(orbit.value) || 0, aspect = canvas.width / canvas.height, far = firstDistance(aspect);
+  const turnedTo = share => ({...data.view, yaw: data.view.yaw + share * degrees * Math.PI / 180});
+  let farther = 1;
+  for (let k = 0; degrees && !data.view.distance && k <= 48; ++k) {
+    const rows = matrix(turnedTo(k / 48));
+    farther = Math.max(farther, distanceToSee(data.outermost.map(p => turnedBy(rows, p.map((v, axis) => v - data.view.pivot[axis]))), aspect) / far);
+  }
+  return share => Object.assign(view, start, {yaw: start.yaw + share * degrees * Math.PI / 180, distance: start.distance * farther});
+}
+
 /// Records all frames at the chosen speed. Returns the video.
 async function recorded() {
   const rate = 30, length = frames[steps - 1] - frames[0], pictures = Math.max(2, Math.round(rate * length / Number(speed.value)));
@@ -35,8 +51,9 @@ async function recorded() {
   recorder.addEventListener('dataavailable', event => pieces.push(event.data));
   const ended = new Promise(done => recorder.addEventListener('stop', done));
   recorder.start();
-  const start = performance.now();
+  const start = performance.now(), turnTo = orbiting();
   for (let k = 0; k < pictures; ++k) {
+    turnTo(k / (pictures - 1));
     show(nearest(frames[0] + k / (pictures - 1) * length));
     copyStage(film);
     await new Promise(done => setTimeout(done, Math.max(0, start + 1000 * (k + 1) / rate - performance.now())));
@@ -48,7 +65,7 @@ async function recorded() {
 
 async function saveVideo() {
   pause();
-  const before = shown.frame;
+  const before = shown.frame, seenFrom = {...view};
   videoButton.disabled = true;
   videoButton.textContent = 'Recording …';
   const film = await recorded(), link = element('a', {href: URL.createObjectURL(film), download: `replay.${videoType.slice(6)}`});
@@ -57,9 +74,10 @@ async function saveVideo() {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
   videoButton.textContent = 'Save video';
   videoButton.disabled = false;
+  Object.assign(view, seenFrom);
   show(before);
 }
 
-videoButton.hidden = !gl || !videoType || steps < 2;
+document.getElementById('with-orbit').hidden = videoButton.hidden = !gl || !videoType || steps < 2;
 videoButton.addEventListener('click', saveVideo);
 if (!videoButton.hidden && asked.has('video')) saveVideo();

@@ -1,5 +1,5 @@
 // A live view: frames of phyxels come through a socket, shaders carry the surface along, and the pointer pulls bodies.
-const asked = new URLSearchParams(location.hash.slice(1));  // #colours=speed&phyxels
+const asked = new URLSearchParams(location.hash.slice(1));  // #colours=speed&phyxels&cut=y:0.1
 const rest = {surfels: data.surfels ? new Float32Array(bytesOf('rest-surfels')) : null, phyxels: new Float32Array(bytesOf('rest-phyxels'))}, ids = new Uint32Array(bytesOf('ids'));
 const carriers = data.surfels ? new Uint32Array(bytesOf('carriers')) : null, weights = data.surfels ? new Uint8Array(bytesOf('weights')) : null;
 const each = data.carriers, numbersEach = 16, stepsOfNumbers = 32767, perRow = 256;  // phyxels in a row of the texture of motions
@@ -74,7 +74,7 @@ float shade() { return hue(of(gl_VertexID, 0), resting(gl_VertexID)); }`,
   scale: [1, 1, 1],
   low: [0, 0, 0],
   prepare() {
-    const bodies = bodiesOf('phyxels'), rows = Math.ceil(data.phyxels / perRow);
+    const bodies = this.bodies = bodiesOf('phyxels'), rows = Math.ceil(data.phyxels / perRow);
     const texture = (unit, format, width) => {
       const made = gl.createTexture();
       gl.activeTexture(gl.TEXTURE0 + unit);
@@ -131,6 +131,9 @@ float shade() { return hue(of(gl_VertexID, 0), resting(gl_VertexID)); }`,
     attribute(0, this.balls, 3, gl.FLOAT, false);
   },
   about() { return followed; },
+  phyxelAt(frame, i) { return phyxelAt(frame, i); },
+  /// The value of a phyxel as shaders have it.
+  valueAt(frame, i) { return shown.field < 0 ? this.bodies[i] / 65535 : 0.5 + 0.5 * frame.numbers[numbersEach * i + 3] / stepsOfNumbers; },
   farther() { return farther; },
   takes(event) {
     if (!hand || event.pointerId !== hand.pointer) return false;
@@ -173,7 +176,6 @@ function onStage(p) {
   return [(1 + lens / aspect * seen[0] / -seen[2]) / 2 * canvas.clientWidth, (1 - lens * seen[1] / -seen[2]) / 2 * canvas.clientHeight];
 }
 const less = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-const cross3 = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
 
 /// The phyxel under a ray, and where it is hit; null if there is none. Source of the test of triangles: Möller and Trumbore 1997.
 function hitBy({eye, way}) {
@@ -339,6 +341,7 @@ function control() {
   for (const factor of [0.001, 0.01, 0.1, 0.25, 0.5, 1, 2, 5]) pace.append(element('option', {value: factor}, `${factor} × real time`));
   pace.value = 1;
   controlShown();
+  controlCut();
   pace.addEventListener('change', () => send({do: 'pace', factor: Number(pace.value)}));
   field.addEventListener('change', () => { shown.field = Number(field.value); send({do: 'show', field: shown.field < 0 ? 'bodies' : data.fields[shown.field].name}); draw(); });
   log.addEventListener('change', () => { shown.log = log.checked; draw(); });
