@@ -83,6 +83,13 @@ py::array taken(std::vector<T>&& values) {
   return over(*kept, owner);
 }
 
+/// An owner of NumPy arrays that keeps an object alive.
+template <class T>
+py::capsule keeper(std::shared_ptr<T> kept) {
+  return py::capsule(new std::shared_ptr<T>(std::move(kept)),
+                     [](void* p) { delete static_cast<std::shared_ptr<T>*>(p); });
+}
+
 /// The shape of an array as text, e.g. "(5, 2)".
 inline std::string shape_words(const py::array& array) {
   return py::str(array.attr("shape")).cast<std::string>();

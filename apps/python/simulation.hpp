@@ -32,13 +32,6 @@
 
 namespace phyxel::python {
 
-/// An owner of NumPy arrays that keeps an object alive.
-template <class T>
-py::capsule keeper(std::shared_ptr<T> kept) {
-  return py::capsule(new std::shared_ptr<T>(std::move(kept)),
-                     [](void* p) { delete static_cast<std::shared_ptr<T>*>(p); });
-}
-
 /// The live state of the CPU, as NumPy sees it.
 struct Live {
   py::array displacement, velocity;  // (packs, 3, lanes)
