@@ -63,6 +63,8 @@ law = 'st-venant-kirchhoff' # body.material.law => law = 'corotated'
 volume_stiffness = 10 # body.material.volume_stiffness => volume_stiffness = 20
 damping = 1 # body.material.damping => damping = 2
 viscosity = 1 # body.material.viscosity => viscosity = 2
+expansion = 1e-5 # body.material.expansion => expansion = 2e-5
+temperature_change = 10 # body.material.temperature_change => temperature_change = 20
 hourglass = 0.1 # body.material.hourglass => hourglass = 0.2
 [body.neighbours]
 support = 'adaptive' # body.neighbours.support => support = 'uniform'
@@ -78,6 +80,8 @@ law = 'st-venant-kirchhoff' # body.inclusion.law => law = 'neo-hookean'
 volume_stiffness = 10 # body.inclusion.volume_stiffness => volume_stiffness = 20
 damping = 1 # body.inclusion.damping => damping = 2
 viscosity = 1 # body.inclusion.viscosity => viscosity = 2
+expansion = 1e-5 # body.inclusion.expansion => expansion = 2e-5
+temperature_change = 10 # body.inclusion.temperature_change => temperature_change = 20
 [[body.fixed]]
 indices = [1, 2] # selection.indices => indices = [1, 3]
 axes = 'x' # body.fixed.axes => axes = 'xz'
@@ -240,10 +244,13 @@ law = 'j2-curve'
 young = 1e5
 poisson = 0.3
 flow_curve = [[0, 1e3], [0.1, 2e3]] # body.material.flow_curve => flow_curve = [[0, 1e3], [0.1, 3e3]]
+expansion = 1e-5
+temperature_curve = [[0, 1], [1, 2]] # body.material.temperature_curve => temperature_curve = [[0, 1], [1, 3]]
 density = 1000
 [[body.inclusion]]
 region = 'x-'
 flow_curve = [[0, 1e3], [0.1, 2e3]] # body.inclusion.flow_curve => flow_curve = [[0, 1e3], [0.1, 3e3]]
+temperature_curve = [[0, 1], [1, 2]] # body.inclusion.temperature_curve => temperature_curve = [[0, 1], [1, 3]]
 [[body]]
 name = 'ninth'
 cloud = 'd'
