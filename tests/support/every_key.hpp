@@ -255,7 +255,7 @@ temperature_curve = [[0, 1], [1, 2]] # body.inclusion.temperature_curve => tempe
 name = 'ninth'
 cloud = 'd'
 [body.material]
-law = 'johnson-cook'
+law = 'johnson-cook-damage'
 young = 1e5
 poisson = 0.3
 yield_stress = 1e3
@@ -269,6 +269,12 @@ temperature = 300 # body.material.temperature => temperature = 310
 reference_temperature = 290 # body.material.reference_temperature => reference_temperature = 280
 melting_temperature = 1300 # body.material.melting_temperature => melting_temperature = 1400
 softening_exponent = 1 # body.material.softening_exponent => softening_exponent = 1.1
+d1 = 0.1 # body.material.d1 => d1 = 0.2
+d2 = 1 # body.material.d2 => d2 = 2
+d3 = -2 # body.material.d3 => d3 = -3
+d4 = 0.01 # body.material.d4 => d4 = 0.02
+d5 = 1 # body.material.d5 => d5 = 2
+energy_release_rate = 1000 # body.material.energy_release_rate => energy_release_rate = 2000
 density = 1000
 [[body.inclusion]]
 region = 'x-'
@@ -282,6 +288,12 @@ temperature = 300 # body.inclusion.temperature => temperature = 310
 reference_temperature = 290 # body.inclusion.reference_temperature => reference_temperature = 280
 melting_temperature = 1300 # body.inclusion.melting_temperature => melting_temperature = 1400
 softening_exponent = 1 # body.inclusion.softening_exponent => softening_exponent = 1.1
+d1 = 0.1 # body.inclusion.d1 => d1 = 0.2
+d2 = 1 # body.inclusion.d2 => d2 = 2
+d3 = -2 # body.inclusion.d3 => d3 = -3
+d4 = 0.01 # body.inclusion.d4 => d4 = 0.02
+d5 = 1 # body.inclusion.d5 => d5 = 2
+energy_release_rate = 1000 # body.inclusion.energy_release_rate => energy_release_rate = 2000
 [[body]]
 name = 'tenth'
 cloud = 'd'

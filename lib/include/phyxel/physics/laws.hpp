@@ -9,6 +9,7 @@
 #include "phyxel/physics/laws/j2.hpp"
 #include "phyxel/physics/laws/j2_curve.hpp"
 #include "phyxel/physics/laws/johnson_cook.hpp"
+#include "phyxel/physics/laws/johnson_cook_damage.hpp"
 #include "phyxel/physics/laws/maxwell.hpp"
 #include "phyxel/physics/laws/mooney_rivlin.hpp"
 #include "phyxel/physics/laws/neo_hookean.hpp"
@@ -22,7 +23,7 @@ namespace phyxel {
 
 /// Every law, in the order of the reference of scenes.
 using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
-                     Orthotropic, J2, J2Curve, JohnsonCook, Clay, Maxwell>;
+                     Orthotropic, J2, J2Curve, JohnsonCook, JohnsonCookDamage, Clay, Maxwell>;
 
 /// An upper bound of the factor by which viscosity exceeds that at rest: it acts on the rate of
 /// Green's strain, and so grows as the stretch squared.
