@@ -40,7 +40,6 @@ std::string terms_of(const Part& part) {
   if (part.closure > 0) terms += fmt::format(", closed gradients (to {:g})", part.closure);
   if (m.damping > 0) terms += fmt::format(", damping ({:g} 1/s)", m.damping);
   if (m.viscosity > 0) terms += fmt::format(", viscosity ({:g} s)", m.viscosity);
-  if (m.expands()) terms += fmt::format(", expansion ({:g} 1/K)", m.expansion);
   return terms;
 }
 

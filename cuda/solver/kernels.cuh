@@ -250,8 +250,7 @@ __device__ __forceinline__ Real residual_of(const char* image, const DeviceLists
 
 /// Pass 1: displacements -> gradient -> strain -> stress -> pair stress Q. With `only_gradient`,
 /// only the gradients are written. @tparam Terms a list of pair terms
-/// @tparam Law one of `Laws`, its sum with `VolumeConservation`, `AnyViscousLaw` or
-/// `AnyExpandingLaw`
+/// @tparam Law one of `Laws`, its sum with `VolumeConservation`, or `AnyViscousLaw`
 template <class Real, class StateReal, class Law, class Terms, bool only_gradient,
           class Halo = NoHalo>
 __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
@@ -319,7 +318,7 @@ __global__ void __launch_bounds__(tile_size, (pass_1_blocks<Real, Law, Terms>))
   } else {
     const HistoryColumns<Real> history{f.history, f.places, place};
     Mat3<Real> stress;
-    if constexpr (is_any_law<Law>) {
+    if constexpr (std::is_same_v<Law, AnyViscousLaw>) {
       stress = stress_of_material<Law>(body, grad_u, history, f.history_use, f.history_interval);
     } else {
       stress = stress_of_law(make_law<Law, Real>(body.law), grad_u, history, f.history_use,

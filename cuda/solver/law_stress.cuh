@@ -10,8 +10,9 @@
 
 namespace phyxel::cuda {
 
-/// Number of constants in `ChosenLaw::constants`: those of any law, and those beside it.
-inline constexpr int law_numbers = Laws::most_constants + BesideLaw::count;
+/// Number of constants in `ChosenLaw::constants`: those of any law, the stiffness of volume
+/// conservation and the relaxation time of viscosity.
+inline constexpr int law_numbers = Laws::most_constants + 2;
 
 /// A law chosen at run time, per tile, among those without a history: for resident kernels that
 /// serve bodies of several laws.
@@ -22,11 +23,6 @@ struct AnyViscousLaw {
 };
 /// A law chosen likewise among all laws, with or without viscosity.
 struct AnyLawWithHistory {
-  static constexpr bool many_registers = true;
-};
-
-/// A law chosen likewise among all laws, of a material that expands.
-struct AnyExpandingLaw {
   static constexpr bool many_registers = true;
 };
 
@@ -133,12 +129,6 @@ __device__ Mat3<Real> stress_of_law(const Law& law, const Mat3<Real>& grad_u,
   }
 }
 
-/// True for the tags of laws that each tile chooses.
-template <class Law>
-inline constexpr bool is_any_law =
-    std::is_same_v<Law, AnyLaw> || std::is_same_v<Law, AnyViscousLaw> ||
-    std::is_same_v<Law, AnyLawWithHistory> || std::is_same_v<Law, AnyExpandingLaw>;
-
 /// Returns P of a tile's material [Pa]: its law, with volume conservation and viscosity if it has
 /// them.
 /// @tparam Law one of `Laws`, then without viscosity, or a law chosen at run time
@@ -147,30 +137,26 @@ __device__ Mat3<Real> stress_of_material(const Constants& body, const Mat3<Real>
                                          History&& history, HistoryUse use, Real interval) {
   const auto stress = [&](const auto& law) {
     using Own = std::decay_t<decltype(law)>;
-    const Real* const beside = body.law + constants_of_law<Own, Real>;
-    const VolumeConservation<Real> volume{beside[BesideLaw::volume_stiffness]};
-    if constexpr (std::is_same_v<Law, AnyExpandingLaw>) {
-      return stress_of_law(expanding_law<Real>(law, beside), grad_u, history, use, interval);
-    } else {
-      if constexpr (std::is_same_v<Law, AnyViscousLaw> || std::is_same_v<Law, AnyLawWithHistory>) {
-        const Real time = beside[BesideLaw::relaxation_time];
-        if (std::is_same_v<Law, AnyViscousLaw> || time > Real(0)) {
-          return stress_of_law(ViscousLaw<Own, Real>{{law, volume}, time}, grad_u, history, use,
-                               interval);
-        }
-      }
-      if constexpr (std::is_same_v<Law, AnyViscousLaw> ||
-                    (std::is_same_v<Law, AnyLaw> && has_history<Own>)) {
-        return Mat3<Real>{};  // no tile has such a law
-      } else {
-        if (!(volume.stiffness > Real(0))) {
-          return stress_of_law(law, grad_u, history, use, interval);
-        }
-        return stress_of_law(SolidLaw<Own, Real>{law, volume}, grad_u, history, use, interval);
+    const VolumeConservation<Real> volume{body.law[constants_of_law<Own, Real>]};
+    if constexpr (std::is_same_v<Law, AnyViscousLaw> || std::is_same_v<Law, AnyLawWithHistory>) {
+      const Real time = body.law[constants_of_law<Own, Real> + 1];
+      if (std::is_same_v<Law, AnyViscousLaw> || time > Real(0)) {
+        return stress_of_law(ViscousLaw<Own, Real>{{law, volume}, time}, grad_u, history, use,
+                             interval);
       }
     }
+    if constexpr (std::is_same_v<Law, AnyViscousLaw> ||
+                  (std::is_same_v<Law, AnyLaw> && has_history<Own>)) {
+      return Mat3<Real>{};  // no tile has such a law
+    } else {
+      if (!(volume.stiffness > Real(0))) {
+        return stress_of_law(law, grad_u, history, use, interval);
+      }
+      return stress_of_law(SolidLaw<Own, Real>{law, volume}, grad_u, history, use, interval);
+    }
   };
-  if constexpr (is_any_law<Law>) {
+  if constexpr (std::is_same_v<Law, AnyLaw> || std::is_same_v<Law, AnyViscousLaw> ||
+                std::is_same_v<Law, AnyLawWithHistory>) {
     return Laws::with<Real>(body.law_index, body.law, stress);
   } else {
     return stress(make_law<Law, Real>(body.law));

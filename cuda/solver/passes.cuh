@@ -234,9 +234,6 @@ class Passes {
   }
   template <class Terms, class Halo>
   static Pass1<Halo> pass_1_of(const Material& m) {
-    if (m.expands()) {
-      return cuda::pass_1<Real, StateReal, AnyExpandingLaw, Terms, false, Halo>;
-    }
     if (m.viscosity > 0) return cuda::pass_1<Real, StateReal, AnyViscousLaw, Terms, false, Halo>;
     return Laws::with_type<Real>(chosen_law(m).index, [&]<class Law>(std::type_identity<Law>) {
       using WithVolume = SolidLaw<Law, Real>;

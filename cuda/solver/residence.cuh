@@ -60,7 +60,6 @@ class Residence {
     constexpr Index most_places = 1 << 18;  // far more than any GPU can hold
     const DeviceTiling& on_device = m_.tiling();
     if (m_.size() == 0) return "there are no phyxels";
-    if (needs_tiles()) return "a material of " + m_.subject() + " expands";
     const std::string too_large =
         "neighbours of " + m_.subject() + " do not fit the GPU's shared memory";
     if (on_device.places() > most_places || !may_fit()) return too_large;
@@ -112,12 +111,6 @@ class Residence {
                                                 pairs_.data(), weights_.data());
     m_.launched("weigh_pairs", slices, threads);
     m_.wait();
-  }
-  /// True if a body's material expands, for which only kernels of tiles are compiled: others would
-  /// hold more numbers in registers for all bodies with a history.
-  bool needs_tiles() const {
-    return std::any_of(m_.model().parts.begin(), m_.model().parts.end(),
-                       [](const Part& part) { return part.material.expands(); });
   }
   /// Quick check before a plan is made, which takes time.
   bool may_fit() const {

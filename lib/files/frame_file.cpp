@@ -161,7 +161,6 @@ std::span<const DiagnosticColumn> diagnostic_columns() {
       {"hourglass_energy", "J", [](D d) { return d.hourglass_energy; }},
       {"plastic_work", "J", [](D d) { return d.plastic_work; }},
       {"viscous_work", "J", [](D d) { return d.viscous_work; }},
-      {"thermal_work", "J", [](D d) { return d.thermal_work; }},
       {"contact_loss", "J", [](D d) { return d.contact_loss; }},
       {"contact_energy", "J", [](D d) { return d.contact_energy; }},
       {"fracture_energy", "J", [](D d) { return d.fracture_energy; }},

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 
 #include "model/closing_areas.hpp"
@@ -14,7 +13,6 @@
 #include "phyxel/body_file.hpp"
 #include "phyxel/custom_law.hpp"
 #include "phyxel/error.hpp"
-#include "phyxel/law_table.hpp"
 #include "phyxel/physics/moment.hpp"
 #include "stage.hpp"
 #include "tabulated.hpp"
@@ -319,9 +317,6 @@ void BodySums::tell(Part& part) const {
   part.mass = mass.value();
   part.volume = volume.value();
   if (part.mass > 0) part.centre = moment.value() / part.mass;
-  if (part.size > 0 && has_parameter(part.material.law, material_spacing.name)) {
-    part.material.spacing = std::cbrt(part.volume / part.size);
-  }
 }
 
 std::vector<const Selection*> selections_of(const BodyRequest& request) {

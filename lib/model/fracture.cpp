@@ -183,10 +183,6 @@ void check_fracture(const BodyRequest& request) {
         refuse_material("viscosity", fmt::format("{:g}", material.viscosity),
                         "0, as the rate of a gradient that jumps where a pair breaks has no sense");
       }
-      if (material.expands()) {
-        refuse_material("expansion", fmt::format("{:g}", material.expansion),
-                        "0, as the stretch of what has expanded is no measure of stress");
-      }
       refuse_material("law", fmt::format("\"{}\"", law),
                       "an elastic law, as the stretch of what has yielded is no measure of stress");
     }

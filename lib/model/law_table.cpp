@@ -176,8 +176,6 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
       value = material.poisson;
     } else if (name == "density") {
       value = material.density;
-    } else if (name == "spacing") {
-      value = material.spacing;
     } else if (const auto at = material.parameters.find(name); at != material.parameters.end()) {
       value = at->second;
     } else if (parameter.required()) {
@@ -189,42 +187,6 @@ std::vector<double> values_of(const LawEntry& law, const Material& material) {
     for (std::size_t k = 0; k < missing; ++k) values.push_back(values[values.size() - 2]);
   }
   return values;
-}
-
-/// Writes the constants beside a law.
-void put_beside(const Material& material, double* beside) {
-  beside[BesideLaw::volume_stiffness] = material.volume_stiffness;
-  beside[BesideLaw::relaxation_time] = material.viscosity;
-  if (!material.expands()) return;
-  const std::array<double, 2> always[] = {{0, material.temperature_change}};
-  using Curve = std::span<const std::array<double, 2>>;
-  const Curve curve =
-      material.temperature_curve.empty() ? Curve(always) : Curve(material.temperature_curve);
-  constexpr auto points = static_cast<std::size_t>(ThermalStrain<double>::points);
-  if (curve.size() > points) {
-    throw InputError(
-        fmt::format("temperature_curve: {} points found; allowed: 1 to {}", curve.size(), points));
-  }
-  for (std::size_t k = 0; k < curve.size(); ++k) {
-    const auto [time, change] = curve[k];
-    if (time >= (k == 0 ? 0 : std::nextafter(curve[k - 1][0], 1e300)) && std::isfinite(time)) {
-      continue;
-    }
-    throw InputError(fmt::format(
-        "temperature_curve: point {} is [{:g}, {:g}]; allowed: times that ascend, from 0 or later",
-        k + 1, time, change));
-  }
-  constexpr double most = 0.1;
-  for (const auto& [time, change] : curve) {
-    if (std::abs(material.expansion * change) <= most) continue;
-    throw InputError(fmt::format(
-        "expansion = {:g} 1/K with a change of the temperature by {:g} K found, a strain of {:g}; "
-        "allowed: strains from {:g} to {:g}",
-        material.expansion, change, material.expansion * change, -most, most));
-  }
-  beside[BesideLaw::expands] = 1;
-  const auto constants = ThermalStrain<double>::constants(material.expansion, curve);
-  std::copy(constants.begin(), constants.end(), beside + BesideLaw::thermal_strain);
 }
 
 /// A time [s] of a material's law; 0 for a caller's law.
@@ -265,8 +227,7 @@ std::span<const LawEntry> law_table() {
 bool is_own_parameter(const LawParameter& parameter) {
   return parameter.name != std::string_view(young_modulus.name) &&
          parameter.name != std::string_view(poisson_ratio.name) &&
-         parameter.name != std::string_view(material_density.name) &&
-         parameter.name != std::string_view(material_spacing.name);
+         parameter.name != std::string_view(material_density.name);
 }
 
 ParameterValue typical_value(const LawParameter& parameter, double scale) {
@@ -305,7 +266,8 @@ ChosenLaw chosen_law(const Material& material) {
     const auto constants = Law::constants(values);
     static_assert(std::tuple_size_v<decltype(constants)> == constants_of_law<Law, double>);
     std::copy(constants.begin(), constants.end(), chosen.constants.begin());
-    put_beside(material, chosen.constants.data() + constants.size());
+    chosen.constants[constants.size()] = material.volume_stiffness;
+    chosen.constants[constants.size() + 1] = material.viscosity;
   });
   return chosen;
 }
@@ -319,12 +281,11 @@ std::vector<std::string> history_names(const Material& material) {
       names.emplace_back(n.name);
     }
   }
-  const auto add = [&](std::span<const HistoryNumber> numbers) {
-    for (const HistoryNumber& n : numbers) names.emplace_back(n.name);
-  };
-  using Viscous = WithViscosity<SmallStrain<double>, double>;
-  if (material.viscosity > 0 || material.expands()) add(Viscous::history);
-  if (material.expands()) add(ThermalState<double>::history);
+  if (material.viscosity > 0) {
+    for (const HistoryNumber& n : WithViscosity<SmallStrain<double>, double>::history) {
+      names.emplace_back(n.name);
+    }
+  }
   return names;
 }
 

@@ -108,10 +108,6 @@ std::uint64_t model_digest_before_4(const Model& model, std::span<const Surface>
       add(state.get(), std::vector<double>(value.numbers().begin(), value.numbers().end()));
     }
     if (m.viscosity > 0) add(state.get(), std::vector<double>{m.viscosity});
-    if (m.expands()) {
-      add(state.get(), std::vector<double>{m.expansion, m.temperature_change});
-      add(state.get(), m.temperature_curve);
-    }
     if (m.custom_law) {
       const std::string name = m.custom_law->name();
       add(state.get(), std::vector<char>(name.begin(), name.end()));

@@ -25,8 +25,7 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
     const bool is_it = material.law == entry.name;
     for (const LawParameter& parameter : entry.parameters) {
       const std::string name = parameter.name;
-      // Those of the material and of the body.
-      if (name == material_density.name || name == material_spacing.name) continue;
+      if (name == material_density.name) continue;  // that of the material
       if (!is_it) {
         if (!table.has(parameter.name) || has_parameter(material.law, name)) continue;
         table.refuse(parameter.name,
@@ -62,15 +61,6 @@ void read_law(const SceneTable& table, Material& material, bool inherits) {
   material.parameters = std::move(parameters);
 }
 
-void read_expansion(const SceneTable& table, Material& material) {
-  table.expect_apart("temperature_curve", "temperature_change");
-  if (table.has("temperature_curve")) material.temperature_change = 0;
-  if (table.has("temperature_change")) material.temperature_curve.clear();
-  table.read("expansion", material.expansion);
-  table.read("temperature_change", material.temperature_change);
-  table.read("temperature_curve", material.temperature_curve);
-}
-
 Material read_material(const SceneTable& table, const BodyRequest& body) {
   Material material;
   material.law = default_law(body);
@@ -79,7 +69,6 @@ Material read_material(const SceneTable& table, const BodyRequest& body) {
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
   table.read("viscosity", material.viscosity);
-  read_expansion(table, material);
   table.read("hourglass", material.hourglass);
   return material;
 }
@@ -115,7 +104,6 @@ InclusionRequest read_inclusion(const SceneTable& table, Material material) {
   table.read("volume_stiffness", material.volume_stiffness);
   table.read("damping", material.damping);
   table.read("viscosity", material.viscosity);
-  read_expansion(table, material);
   return {select, material};
 }
 

@@ -304,16 +304,6 @@ std::vector<SceneKey> body_keys() {
        .meaning = "Kelvin-Voigt damping, in proportion to the stiffness: a relaxation time tau. A "
            "mode of angular frequency omega is damped by the share tau omega / 2 of critical "
            "damping; rigid motion is not damped. 0: none."},
-      {.section = "body.material", .name = "expansion", .unit = "1/K", .fallback = "0",
-       .range = within(1), .meaning = "Coefficient of thermal expansion alpha: steel 1.2e-5. A body that is warmer by dT "
-           "than where it has no stress expands by alpha dT in all directions if it is free, -0.1 to 0.1; 0: none."},
-      {.section = "body.material", .name = "temperature_change", .unit = "K", .fallback = "0",
-       .range = within(1e6), .meaning = "dT, by how much the material is warmer than where it has no stress."},
-      {.section = "body.material", .name = "temperature_curve", .type = KeyType::curve, .unit = "K",
-       .otherwise = "none", .range = within(1e6),
-       .meaning = "dT by time, in place of `temperature_change`: linear between the points, "
-           "constant before the first and after the last. The method \"equilibrium\" takes the last.",
-       .curve = {.y = "dT", .most_points = ThermalStrain<double>::points}},
       {.section = "body.material", .name = "hourglass", .otherwise = "0.1; 0 for the paper's bodies, and with one-sided lists", .range = between(0, 1e6),
        .meaning = "Strength of hourglass control, as a share of E (`young`, or what follows from "
            "the parameters of a law without it): energy of what does not "
@@ -336,12 +326,6 @@ std::vector<SceneKey> body_keys() {
        .range = between(0, 1e12), .meaning = "As in `[body.material]`."},
       {.section = "body.inclusion", .name = "viscosity", .unit = "s", .otherwise = "the body's",
        .range = between(0, 1e9), .meaning = "As in `[body.material]`."},
-      {.section = "body.inclusion", .name = "expansion", .unit = "1/K", .otherwise = "the body's",
-       .range = within(1), .meaning = "As in `[body.material]`."},
-      {.section = "body.inclusion", .name = "temperature_change", .unit = "K", .otherwise = "the body's", .range = within(1e6), .meaning = "As in `[body.material]`."},
-      {.section = "body.inclusion", .name = "temperature_curve", .type = KeyType::curve, .unit = "K", .otherwise = "the body's", .range = within(1e6),
-       .meaning = "As in `[body.material]`.",
-       .curve = {.y = "dT", .most_points = ThermalStrain<double>::points}},
 
       {.section = "body.neighbours", .name = "support", .type = KeyType::choice,
        .fallback = "\"automatic\"", .words = {"automatic", "uniform", "adaptive", "pairwise"},

@@ -106,9 +106,6 @@ void visit_material(const char* section, const BodyRequest& body, const Material
   visit(section, "volume_stiffness", m.volume_stiffness);
   visit(section, "damping", m.damping);
   visit(section, "viscosity", m.viscosity);
-  visit(section, "expansion", m.expansion);
-  visit(section, "temperature_change", m.temperature_change);
-  if (!m.temperature_curve.empty()) visit(section, "temperature_curve", m.temperature_curve);
 }
 
 /// Visits the keys of a path, in the section of what moves along it.

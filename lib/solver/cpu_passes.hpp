@@ -337,10 +337,6 @@ class CpuPasses : public CpuArrays<Real, StateReal> {
         apply([&](Index p, const Mat3<P>& grad_u)
                   __attribute__((always_inline)) { return stress_of(whole, p, grad_u, use); });
       };
-      if (m.expands()) {
-        const auto* const beside = run.law.constants.data() + constants_of_law<Law, P>;
-        return apply_to(expanding_law<P>(law, beside));
-      }
       if (m.viscosity > 0) {
         using Solid = SumOf<Law, VolumeConservation<P>>;
         return apply_to(WithViscosity<Solid, P>{{law, volume}, P(m.viscosity)});

@@ -54,10 +54,8 @@ class PartLaw {
     const double stiffness = material_.volume_stiffness;
     // Volume conservation and viscosity are evaluated with Hooke's law in place of the caller's,
     // and Hooke's stress is subtracted.
-    std::array<double, 2 + BesideLaw::count> beside{};
-    beside[0] = material_.lame_lambda(), beside[1] = material_.lame_mu();
-    beside[2 + BesideLaw::volume_stiffness] = stiffness;
-    beside[2 + BesideLaw::relaxation_time] = material_.viscosity;
+    const std::array<double, 4> beside{material_.lame_lambda(), material_.lame_mu(), stiffness,
+                                       material_.viscosity};
     if (stiffness > 0 || material_.viscosity > 0) {
       const auto number = [&](int k) {
         return history[custom_numbers_ + static_cast<std::size_t>(k)];

@@ -18,7 +18,6 @@ struct Sums {
     hourglass_energy,
     plastic_work,
     viscous_work,
-    thermal_work,
     gravity_energy,
     load_energy,
     force_scale,
@@ -86,7 +85,6 @@ PHYXEL_HD PhyxelTotals totals_of(const PhyxelState& p, const PointResponse<doubl
   t.sum[Sums::volume_energy] = p.volume * response.volume_energy;
   t.sum[Sums::plastic_work] = p.volume * response.plastic_work;
   t.sum[Sums::viscous_work] = p.volume * response.viscous_work;
-  t.sum[Sums::thermal_work] = p.volume * response.thermal_work;
   if (p.hourglass > 0) t.sum[Sums::hourglass_energy] = hourglass_energy(p.hourglass, p.residual);
   t.sum[Sums::gravity_energy] = -p.mass * dot(p.gravity, p.displacement);
   t.sum[Sums::load_energy] = -dot(p.load, p.displacement);

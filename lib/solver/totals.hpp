@@ -16,7 +16,7 @@ namespace phyxel {
 /// Sums and extremes over phyxels, which are identified by global ids.
 struct Totals {
   ExactSum kinetic_energy, strain_energy, volume_energy, hourglass_energy, plastic_work,
-      viscous_work, thermal_work;
+      viscous_work;
   ExactSum gravity_energy, load_energy;
   ExactSum force_scale, torque_scale;
   ExactVector momentum, angular_momentum, internal_force, internal_torque;
@@ -27,7 +27,7 @@ struct Totals {
   template <class Each>
   void for_each_sum(Each&& each) {
     each(kinetic_energy), each(strain_energy), each(volume_energy), each(hourglass_energy);
-    each(plastic_work), each(viscous_work), each(thermal_work);
+    each(plastic_work), each(viscous_work);
     each(gravity_energy), each(load_energy), each(force_scale), each(torque_scale);
     for (ExactVector* v : {&momentum, &angular_momentum, &internal_force, &internal_torque}) {
       each(v->x), each(v->y), each(v->z);
@@ -88,7 +88,6 @@ struct Totals {
     d.hourglass_energy = hourglass_energy.value();
     d.plastic_work = plastic_work.value();
     d.viscous_work = viscous_work.value();
-    d.thermal_work = thermal_work.value();
     d.gravity_energy = gravity_energy.value();
     d.load_energy = load_energy.value();
     d.momentum = momentum.value();

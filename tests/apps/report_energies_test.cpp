@@ -37,7 +37,6 @@ const std::map<std::string, std::string> columns_of_curves = {
     {"lost otherwise in contact", "other_contact_loss"},
     {"plastic work", "plastic_work"},
     {"viscous work", "viscous_work"},
-    {"work of temperature (less)", "thermal_work"},
     {"taken by fracture", "fracture_energy"}};
 
 const std::string floor_below = "[[obstacle]]\nname = 'a floor, \"hard\"'\nshape = 'plane'\n";

@@ -63,8 +63,6 @@ law = 'st-venant-kirchhoff' # body.material.law => law = 'corotated'
 volume_stiffness = 10 # body.material.volume_stiffness => volume_stiffness = 20
 damping = 1 # body.material.damping => damping = 2
 viscosity = 1 # body.material.viscosity => viscosity = 2
-expansion = 1e-5 # body.material.expansion => expansion = 2e-5
-temperature_change = 10 # body.material.temperature_change => temperature_change = 20
 hourglass = 0.1 # body.material.hourglass => hourglass = 0.2
 [body.neighbours]
 support = 'adaptive' # body.neighbours.support => support = 'uniform'
@@ -80,8 +78,6 @@ law = 'st-venant-kirchhoff' # body.inclusion.law => law = 'neo-hookean'
 volume_stiffness = 10 # body.inclusion.volume_stiffness => volume_stiffness = 20
 damping = 1 # body.inclusion.damping => damping = 2
 viscosity = 1 # body.inclusion.viscosity => viscosity = 2
-expansion = 1e-5 # body.inclusion.expansion => expansion = 2e-5
-temperature_change = 10 # body.inclusion.temperature_change => temperature_change = 20
 [[body.fixed]]
 indices = [1, 2] # selection.indices => indices = [1, 3]
 axes = 'x' # body.fixed.axes => axes = 'xz'
@@ -244,18 +240,15 @@ law = 'j2-curve'
 young = 1e5
 poisson = 0.3
 flow_curve = [[0, 1e3], [0.1, 2e3]] # body.material.flow_curve => flow_curve = [[0, 1e3], [0.1, 3e3]]
-expansion = 1e-5
-temperature_curve = [[0, 1], [1, 2]] # body.material.temperature_curve => temperature_curve = [[0, 1], [1, 3]]
 density = 1000
 [[body.inclusion]]
 region = 'x-'
 flow_curve = [[0, 1e3], [0.1, 2e3]] # body.inclusion.flow_curve => flow_curve = [[0, 1e3], [0.1, 3e3]]
-temperature_curve = [[0, 1], [1, 2]] # body.inclusion.temperature_curve => temperature_curve = [[0, 1], [1, 3]]
 [[body]]
 name = 'ninth'
 cloud = 'd'
 [body.material]
-law = 'johnson-cook-damage'
+law = 'johnson-cook'
 young = 1e5
 poisson = 0.3
 yield_stress = 1e3
@@ -269,12 +262,6 @@ temperature = 300 # body.material.temperature => temperature = 310
 reference_temperature = 290 # body.material.reference_temperature => reference_temperature = 280
 melting_temperature = 1300 # body.material.melting_temperature => melting_temperature = 1400
 softening_exponent = 1 # body.material.softening_exponent => softening_exponent = 1.1
-d1 = 0.1 # body.material.d1 => d1 = 0.2
-d2 = 1 # body.material.d2 => d2 = 2
-d3 = -2 # body.material.d3 => d3 = -3
-d4 = 0.01 # body.material.d4 => d4 = 0.02
-d5 = 1 # body.material.d5 => d5 = 2
-energy_release_rate = 1000 # body.material.energy_release_rate => energy_release_rate = 2000
 density = 1000
 [[body.inclusion]]
 region = 'x-'
@@ -288,12 +275,6 @@ temperature = 300 # body.inclusion.temperature => temperature = 310
 reference_temperature = 290 # body.inclusion.reference_temperature => reference_temperature = 280
 melting_temperature = 1300 # body.inclusion.melting_temperature => melting_temperature = 1400
 softening_exponent = 1 # body.inclusion.softening_exponent => softening_exponent = 1.1
-d1 = 0.1 # body.inclusion.d1 => d1 = 0.2
-d2 = 1 # body.inclusion.d2 => d2 = 2
-d3 = -2 # body.inclusion.d3 => d3 = -3
-d4 = 0.01 # body.inclusion.d4 => d4 = 0.02
-d5 = 1 # body.inclusion.d5 => d5 = 2
-energy_release_rate = 1000 # body.inclusion.energy_release_rate => energy_release_rate = 2000
 [[body]]
 name = 'tenth'
 cloud = 'd'

@@ -406,7 +406,6 @@ void Session::tell_energies() {
                        {"contact", now.contact_energy + now.contact_loss},
                        {"plastic", now.plastic_work},
                        {"viscous", now.viscous_work},
-                       {"thermal", -now.thermal_work},
                        {"fracture", now.fracture_energy},
                        {"total", now.total_energy()}}},
                      {"work", live_.hand_work()}};

@@ -32,8 +32,8 @@ inline constexpr const char* usual_law = NeoHookean<double>::name;
 /// All laws, in the order of `Laws`.
 std::span<const LawEntry> law_table();
 
-/// True for a parameter in `Material::parameters`: those other than `young`, `poisson`, `density`
-/// and `spacing`.
+/// True for a parameter in `Material::parameters`: those other than `young`, `poisson` and
+/// `density`.
 bool is_own_parameter(const LawParameter& parameter);
 
 /// The value of a required parameter in measurements of speed and in tests. @param scale factor of
@@ -49,8 +49,9 @@ std::string laws_with(std::string_view parameter);
 /// A material's law, ready for a kernel.
 struct ChosenLaw {
   int index = 0;  ///< Index in `Laws`.
-  /// The law's constants, then those of `BesideLaw`.
-  std::array<double, Laws::most_constants + BesideLaw::count> constants{};
+  /// The law's constants, then the stiffness of volume conservation [Pa], then the relaxation time
+  /// of viscosity [s].
+  std::array<double, Laws::most_constants + 2> constants{};
   bool operator==(const ChosenLaw&) const = default;
 };
 
@@ -61,8 +62,8 @@ struct ChosenLaw {
 ///   or does not allow
 ChosenLaw chosen_law(const Material& material);
 
-/// The names of a material's history numbers: those of the law, of viscosity, and of expansion,
-/// with which those of viscosity are always there. Empty for an elastic material without either.
+/// The names of a material's history numbers: those of the law, then those of viscosity. Empty for
+/// an elastic material without viscosity.
 /// @throws InputError as `chosen_law`
 std::vector<std::string> history_names(const Material& material);
 

@@ -70,15 +70,6 @@ struct Material {
   double volume_stiffness = 0;
   double damping = 0;    ///< Mass-proportional damping [1/s]; 0: none.
   double viscosity = 0;  ///< Relaxation time τ of Kelvin–Voigt damping [s]; 0: none.
-  double expansion = 0;  ///< Coefficient of thermal expansion α [1/K]; 0: none.
-  /// By how much the material is warmer than where it has no stress [K].
-  double temperature_change = 0;
-  /// The same by time, points [t [s], ΔT [K]] whose times ascend, in place of `temperature_change`;
-  /// empty: none.
-  std::vector<std::array<double, 2>> temperature_curve = {};
-  /// The mean distance between the phyxels [m], for laws with a length; the parts of a model have
-  /// it set.
-  double spacing = 0;
   /// Strength α of hourglass control, in shares of the smallest E of the body; 0: none. Needs one
   /// support for the body. Unset: `default_hourglass`, in scene files and in code alike; the parts
   /// of a model have it set.
@@ -92,10 +83,6 @@ struct Material {
   double lame_lambda() const { return phyxel::lame_lambda(young, poisson); }
   /// The shear modulus [Pa] of `young` and `poisson`, Lamé's second parameter.
   double lame_mu() const { return phyxel::lame_mu(young, poisson); }
-  /// True if the material has another temperature than where it has no stress, and expands.
-  bool expands() const {
-    return expansion != 0 && (temperature_change != 0 || !temperature_curve.empty());
-  }
   bool operator==(const Material&) const = default;
 };
 

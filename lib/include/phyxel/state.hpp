@@ -135,7 +135,6 @@ struct Diagnostics {
   double hourglass_energy = 0;  ///< [J], of hourglass control.
   double plastic_work = 0;      ///< [J], turned into heat since the virgin state.
   double viscous_work = 0;      ///< [J], turned into heat by viscosity since the start.
-  double thermal_work = 0;      ///< [J], done by temperatures that change, since the start.
   double contact_loss = 0;      ///< [J], lost in impacts and by friction on obstacles since t = 0.
   double contact_energy = 0;    ///< [J], stored in the springs of contact by penalties.
   double fracture_energy = 0;   ///< [J], taken from the elastic energy where pairs broke.
@@ -145,11 +144,11 @@ struct Diagnostics {
   double elastic_energy() const { return strain_energy + volume_energy + hourglass_energy; }
   /// Kinetic and elastic energy [J], without the potentials of gravity and loads.
   double kinetic_and_elastic_energy() const { return kinetic_energy + elastic_energy(); }
-  /// Total energy [J], with what has become heat and without what temperatures have done: constant
-  /// in a scene without mass-proportional damping, motions and changing loads (`is_conservative`).
+  /// Total energy [J], with what has become heat: constant in a scene without mass-proportional
+  /// damping, motions and changing loads (`is_conservative`).
   double total_energy() const {
-    return kinetic_and_elastic_energy() + plastic_work + viscous_work - thermal_work +
-           contact_loss + contact_energy + fracture_energy + gravity_energy + load_energy;
+    return kinetic_and_elastic_energy() + plastic_work + viscous_work + contact_loss +
+           contact_energy + fracture_energy + gravity_energy + load_energy;
   }
   Vec3d momentum;          ///< [kg m/s]
   Vec3d angular_momentum;  ///< [kg m^2/s] about the origin.

@@ -154,7 +154,7 @@ function addCharts() {
   };
   // All parts of the total: their sum is constant where the total is.
   const lost = {contact_energy: 'springs of contact', friction_heat: 'heat of friction', impact_loss: 'lost in impacts',
-                other_contact_loss: 'lost otherwise in contact', plastic_work: 'plastic work', viscous_work: 'viscous work', thermal_work: 'work of temperature (less)', fracture_energy: 'taken by fracture'};
+                other_contact_loss: 'lost otherwise in contact', plastic_work: 'plastic work', viscous_work: 'viscous work', fracture_energy: 'taken by fracture'};
   const parts = ['kinetic_energy', 'strain_energy', 'volume_energy', 'hourglass_energy', 'gravity_energy', 'load_energy'];
   chart('Energy', 'energy [J]', [...parts, ...Object.keys(lost), 'total_energy'], n => lost[n] ?? n.replace('_energy', ''));
   chart('Momentum', 'momentum [kg m/s]', ['momentum_x', 'momentum_y', 'momentum_z'], n => n.slice(-1));

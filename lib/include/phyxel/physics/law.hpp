@@ -51,7 +51,6 @@
 #include <limits>
 #include <span>
 #include <type_traits>
-#include <utility>
 
 #include "phyxel/physics/stretches.hpp"
 #include "phyxel/types.hpp"
@@ -107,23 +106,6 @@ inline constexpr LawParameter poisson_ratio{
 /// but a material has it beside its law.
 inline constexpr LawParameter material_density{
     "density", "kg/m^3", 0, 1e18, true, "Density, that of the material."};
-
-/// The mean distance between the phyxels of a part, v^(1/3), a parameter of laws with a length:
-/// they take it with their own parameters, but `Material::spacing` has it, and scenes do not. It is
-/// 0 where there is no body yet.
-inline constexpr LawParameter material_spacing{
-    "spacing", "m", 0, 1e18, false, "Distance between the phyxels, that of the body."};
-
-/// The parameters of two tables, one after the other.
-template <std::size_t n, std::size_t m>
-constexpr std::array<LawParameter, n + m> joined_parameters(const LawParameter (&first)[n],
-                                                            const LawParameter (&second)[m]) {
-  return [&]<std::size_t... i, std::size_t... k>(std::index_sequence<i...>,
-                                                 std::index_sequence<k...>) {
-    return std::array<LawParameter, n + m>{first[i]..., second[k]...};
-  }
-  (std::make_index_sequence<n>{}, std::make_index_sequence<m>{});
-}
 
 /// The number of constants of a law.
 template <class Law, class Real>
@@ -236,16 +218,6 @@ template <class Real, class Law>
 PHYXEL_HD Real viscous_work(const Law& law, [[maybe_unused]] const HistoryOf<Law>& history) {
   if constexpr (requires { law.viscous_work(history); }) {
     return law.viscous_work(history);
-  } else {
-    return Real(0);
-  }
-}
-
-/// Work of heat on the material since the start [J/m³]; 0 for a law without expansion.
-template <class Real, class Law>
-PHYXEL_HD Real thermal_work(const Law& law, [[maybe_unused]] const HistoryOf<Law>& history) {
-  if constexpr (requires { law.thermal_work(history); }) {
-    return law.thermal_work(history);
   } else {
     return Real(0);
   }

@@ -4,12 +4,10 @@
 
 #include "phyxel/physics/laws/clay.hpp"
 #include "phyxel/physics/laws/corotated.hpp"
-#include "phyxel/physics/laws/expansion.hpp"
 #include "phyxel/physics/laws/hencky.hpp"
 #include "phyxel/physics/laws/j2.hpp"
 #include "phyxel/physics/laws/j2_curve.hpp"
 #include "phyxel/physics/laws/johnson_cook.hpp"
-#include "phyxel/physics/laws/johnson_cook_damage.hpp"
 #include "phyxel/physics/laws/maxwell.hpp"
 #include "phyxel/physics/laws/mooney_rivlin.hpp"
 #include "phyxel/physics/laws/neo_hookean.hpp"
@@ -23,7 +21,7 @@ namespace phyxel {
 
 /// Every law, in the order of the reference of scenes.
 using Laws = LawList<StVenantKirchhoff, SmallStrain, NeoHookean, Corotated, Hencky, MooneyRivlin,
-                     Orthotropic, J2, J2Curve, JohnsonCook, JohnsonCookDamage, Clay, Maxwell>;
+                     Orthotropic, J2, J2Curve, JohnsonCook, Clay, Maxwell>;
 
 /// An upper bound of the factor by which viscosity exceeds that at rest: it acts on the rate of
 /// Green's strain, and so grows as the stretch squared.
@@ -35,7 +33,8 @@ PHYXEL_HD Real viscous_stiffening(const PrincipalStretches<Real>& stretches) {
 /// An upper bound of the factor by which the stiffness or viscosity of a material exceeds that at
 /// rest; 1 at rest.
 /// @param law its index in `Laws`
-/// @param constants of `ChosenLaw`
+/// @param constants of the law, then the stiffness of volume conservation [Pa], then the relaxation
+///   time of viscosity [s] (`ChosenLaw`)
 /// @param volume_stiffness of volume conservation [Pa]; 0: none
 template <class Real, class Constant>
 PHYXEL_HD Real stiffening(int law, const Constant* constants, Real volume_stiffness,
@@ -58,36 +57,12 @@ struct PointResponse {
   Mat3<Real> first_piola_stress;          ///< P of law, volume conservation and viscosity [Pa].
   Real strain_energy{}, volume_energy{};  ///< Stored [J/m³].
   Real plastic_work{}, viscous_work{};    ///< Turned into heat so far [J/m³].
-  Real thermal_work{};                    ///< Of heat on the material so far [J/m³].
 };
-
-/// The constants beside those of a law, in the order of `ChosenLaw::constants`.
-struct BesideLaw {
-  enum : int {
-    volume_stiffness,  ///< Of volume conservation [Pa]; 0: none.
-    relaxation_time,   ///< Of viscosity [s]; 0: none.
-    expands,           ///< 1 if the material expands with its temperature, else 0.
-    thermal_strain,    ///< The constants of `ThermalStrain` from here on.
-    count = thermal_strain + ThermalStrain<double>::numbers
-  };
-};
-
-/// A law with volume conservation, viscosity and expansion. A body that expands without viscosity
-/// has it, too, with a relaxation time of 0.
-template <class Law, class Real>
-using ExpandingLaw = WithExpansion<WithViscosity<SumOf<Law, VolumeConservation<Real>>, Real>, Real>;
-
-/// Makes the law of a material that expands. @param beside its constants beside the law
-template <class Real, class Law, class Constant>
-PHYXEL_HD ExpandingLaw<Law, Real> expanding_law(const Law& own, const Constant* beside) {
-  return {{{own, {static_cast<Real>(beside[BesideLaw::volume_stiffness])}},
-           static_cast<Real>(beside[BesideLaw::relaxation_time])},
-          make_law<ThermalStrain<Real>, Real>(beside + BesideLaw::thermal_strain)};
-}
 
 /// The response of a law with its history, volume conservation and viscosity.
 /// @param law its index in `Laws`
-/// @param constants of `ChosenLaw`
+/// @param constants of the law, then the stiffness of volume conservation [Pa], then the relaxation
+///   time of viscosity [s] (`ChosenLaw`)
 /// @param history gives number k of the phyxel's history at the step's start
 /// @param dt length of the step [s]
 template <class Real, class Constant, class History>
@@ -99,27 +74,14 @@ PHYXEL_HD PointResponse<Real> response_after_step(int law, const Constant* const
     using Solid = SumOf<Law, VolumeConservation<Real>>;
     using Viscous = WithViscosity<Solid, Real>;
     const auto* const beside = constants + constants_of_law<Law, Real>;
-    const Solid solid{own, {static_cast<Real>(beside[BesideLaw::volume_stiffness])}};
-    const Real relaxation_time = static_cast<Real>(beside[BesideLaw::relaxation_time]);
+    const Solid solid{own, {static_cast<Real>(beside[0])}};
+    const Real relaxation_time = static_cast<Real>(beside[1]);
     const auto read = [&](auto& state, int numbers) {
-      Real values[history_numbers<ExpandingLaw<Law, Real>, Real>];
+      Real values[history_numbers<Viscous, Real>];
       for (int k = 0; k < numbers; ++k) values[k] = history(k);
       memcpy(static_cast<void*>(&state), values, static_cast<std::size_t>(numbers) * sizeof(Real));
     };
     PointResponse<Real> response;
-    if (beside[BesideLaw::expands] > Constant(0)) {
-      const auto expanding = expanding_law<Real>(own, beside);
-      using Expanding = ExpandingLaw<Law, Real>;
-      typename Expanding::State all{};
-      read(all, history_numbers<Expanding, Real>);
-      response.first_piola_stress = expanding.first_piola_stress(grad_u, all, dt);
-      // Volume conservation is not told apart from the law here.
-      response.strain_energy = expanding.energy(grad_u, all);
-      response.plastic_work = expanding.plastic_work(all);
-      response.viscous_work = expanding.viscous_work(all);
-      response.thermal_work = expanding.thermal_work(all);
-      return response;
-    }
     HistoryOf<Law> state{};
     if (relaxation_time > Real(0)) {
       typename Viscous::State all{};

@@ -21,123 +21,15 @@
 
 namespace phyxel {
 
-/// The parameters of Johnson and Cook's flow stress.
-inline constexpr LawParameter johnson_cook_parameters[] = {
-    young_modulus,
-    poisson_ratio,
-    material_density,
-    virgin_flow_stress,
-    {.name = "hardening_modulus",
-     .unit = "Pa",
-     .low = 0,
-     .high = 1e18,
-     .open = false,
-     .meaning = "B: growth of the flow stress at a plastic strain of 1; 0: none.",
-     .fallback = 0},
-    {.name = "hardening_exponent",
-     .unit = "",
-     .low = 0.01,
-     .high = 10,
-     .open = false,
-     .meaning = "n, the power of the plastic strain in that growth.",
-     .fallback = 1},
-    {.name = "rate_factor",
-     .unit = "",
-     .low = 0,
-     .high = 10,
-     .open = false,
-     .meaning = "C: growth of the flow stress with the logarithm of the plastic rate; 0: none. "
-                "The method \"equilibrium\" knows no rate, and leaves it out.",
-     .fallback = 0},
-    {.name = "reference_rate",
-     .unit = "1/s",
-     .low = 1e-9,
-     .high = 1e12,
-     .open = false,
-     .meaning = "Plastic rate up to which the flow stress is that of slow tests.",
-     .fallback = 1},
-    {.name = "specific_heat",
-     .unit = "J/(kg K)",
-     .low = 1e-6,
-     .high = 1e12,
-     .open = false,
-     .meaning = "Specific heat c_p, which says how much plastic work heats.",
-     .typical = 400},
-    {.name = "heat_fraction",
-     .unit = "",
-     .low = 1e-6,
-     .high = 1,
-     .open = false,
-     .meaning = "Share of plastic work that becomes heat (Taylor and Quinney); the rest stays in "
-                "the material.",
-     .fallback = 0.9},
-    {.name = "temperature",
-     .unit = "K",
-     .low = 0,
-     .high = 1e9,
-     .open = false,
-     .meaning = "Temperature at the start. Output has the rise above it, `temperature_rise`.",
-     .fallback = 293},
-    {.name = "reference_temperature",
-     .unit = "K",
-     .low = 0,
-     .high = 1e9,
-     .open = false,
-     .meaning = "Temperature T_r up to which the flow stress does not soften.",
-     .fallback = 293},
-    {.name = "melting_temperature",
-     .unit = "K",
-     .low = 0,
-     .high = 1e9,
-     .open = false,
-     .meaning = "Temperature T_m at which the flow stress is zero; 0: it does not soften.",
-     .fallback = 0},
-    {.name = "softening_exponent",
-     .unit = "",
-     .low = 0.01,
-     .high = 10,
-     .open = false,
-     .meaning = "m, the power of the relative temperature in the softening.",
-     .fallback = 1}};
-
-/// Returns the condition that Johnson and Cook's parameters violate together: a melting temperature
-/// that is not above the others; "" if there is none.
-inline const char* unmet_of_johnson_cook(std::span<const double> p) {
-  return p[12] == 0 || (p[12] > p[11] && p[12] > p[10])
-             ? ""
-             : "melting_temperature = 0, or melting_temperature > reference_temperature and > "
-               "temperature";
-}
-/// Returns the members of `JohnsonCookFlow`, in their order.
-inline std::array<double, 12> constants_of_johnson_cook(std::span<const double> p) {
-  const std::array<double, 2> lame = lame_constants(p);
-  const double per_heat = p[9] / (p[2] * p[8]), range = p[12] - p[11];
-  const bool softens = p[12] > 0;
-  return {lame[0],
-          lame[1],
-          p[3],
-          p[4],
-          p[5],
-          p[6],
-          p[7],
-          per_heat,
-          p[13],
-          softens ? (p[10] - p[11]) / range : 0,
-          softens ? 1 / range : 0,
-          1 / per_heat};
-}
-
-/// The history of a phyxel of Johnson and Cook's flow stress; all zero: never yielded.
+/// Finite-strain J2 plasticity with Johnson and Cook's flow stress and adiabatic heating.
 template <class Real>
-struct JohnsonCookState : PlasticState<Real> {
-  Real temperature_rise{};  ///< Above the temperature at the start [K].
-};
+struct JohnsonCook : PlasticFlow<JohnsonCook<Real>, Real> {
+  static constexpr const char* name = "johnson-cook";
+  static constexpr const char* meaning =
+      "metals at high rates: Johnson and Cook's flow stress, which grows with plastic strain and "
+      "its rate, falls with temperature, and heats the material";
 
-/// Johnson and Cook's flow stress with adiabatic heating, the base of laws that have it. `Law`
-/// derives from it.
-template <class Law, class Real>
-struct JohnsonCookFlow : PlasticFlow<Law, Real> {
-  using State = JohnsonCookState<Real>;  ///< Or what derives from it.
+  static constexpr bool work_is_potential = false;  // of the rate, and of the temperature before
 
  private:
   static constexpr double first_strain = 1e-6;  ///< ε₀
@@ -145,6 +37,122 @@ struct JohnsonCookFlow : PlasticFlow<Law, Real> {
   static constexpr double fastest = 18.420680743952367;
 
  public:
+  static constexpr LawParameter parameters[] = {
+      young_modulus,
+      poisson_ratio,
+      material_density,
+      virgin_flow_stress,
+      {.name = "hardening_modulus",
+       .unit = "Pa",
+       .low = 0,
+       .high = 1e18,
+       .open = false,
+       .meaning = "B: growth of the flow stress at a plastic strain of 1; 0: none.",
+       .fallback = 0},
+      {.name = "hardening_exponent",
+       .unit = "",
+       .low = 0.01,
+       .high = 10,
+       .open = false,
+       .meaning = "n, the power of the plastic strain in that growth.",
+       .fallback = 1},
+      {.name = "rate_factor",
+       .unit = "",
+       .low = 0,
+       .high = 10,
+       .open = false,
+       .meaning = "C: growth of the flow stress with the logarithm of the plastic rate; 0: none. "
+                  "The method \"equilibrium\" knows no rate, and leaves it out.",
+       .fallback = 0},
+      {.name = "reference_rate",
+       .unit = "1/s",
+       .low = 1e-9,
+       .high = 1e12,
+       .open = false,
+       .meaning = "Plastic rate up to which the flow stress is that of slow tests.",
+       .fallback = 1},
+      {.name = "specific_heat",
+       .unit = "J/(kg K)",
+       .low = 1e-6,
+       .high = 1e12,
+       .open = false,
+       .meaning = "Specific heat c_p, which says how much plastic work heats.",
+       .typical = 400},
+      {.name = "heat_fraction",
+       .unit = "",
+       .low = 1e-6,
+       .high = 1,
+       .open = false,
+       .meaning = "Share of plastic work that becomes heat (Taylor and Quinney); the rest stays in "
+                  "the material.",
+       .fallback = 0.9},
+      {.name = "temperature",
+       .unit = "K",
+       .low = 0,
+       .high = 1e9,
+       .open = false,
+       .meaning = "Temperature at the start. Output has the rise above it, `temperature_rise`.",
+       .fallback = 293},
+      {.name = "reference_temperature",
+       .unit = "K",
+       .low = 0,
+       .high = 1e9,
+       .open = false,
+       .meaning = "Temperature T_r up to which the flow stress does not soften.",
+       .fallback = 293},
+      {.name = "melting_temperature",
+       .unit = "K",
+       .low = 0,
+       .high = 1e9,
+       .open = false,
+       .meaning = "Temperature T_m at which the flow stress is zero; 0: it does not soften.",
+       .fallback = 0},
+      {.name = "softening_exponent",
+       .unit = "",
+       .low = 0.01,
+       .high = 10,
+       .open = false,
+       .meaning = "m, the power of the relative temperature in the softening.",
+       .fallback = 1}};
+
+  /// Rejects a melting temperature that is not above the others.
+  static const char* unmet(std::span<const double> p) {
+    return p[12] == 0 || (p[12] > p[11] && p[12] > p[10])
+               ? ""
+               : "melting_temperature = 0, or melting_temperature > reference_temperature and > "
+                 "temperature";
+  }
+  /// The members below, in their order.
+  static std::array<double, 12> constants(std::span<const double> p) {
+    const std::array<double, 2> lame = lame_constants(p);
+    const double per_heat = p[9] / (p[2] * p[8]), range = p[12] - p[11];
+    const bool softens = p[12] > 0;
+    return {lame[0],
+            lame[1],
+            p[3],
+            p[4],
+            p[5],
+            p[6],
+            p[7],
+            per_heat,
+            p[13],
+            softens ? (p[10] - p[11]) / range : 0,
+            softens ? 1 / range : 0,
+            1 / per_heat};
+  }
+  /// The smaller of E and 10 A [Pa].
+  static double hourglass_modulus(std::span<const double> values) {
+    return flowing_modulus(values[0], values[3]);
+  }
+
+  static constexpr HistoryNumber history[] = {
+      plastic_history[0], plastic_history[1], plastic_history[2], plastic_history[3],
+      plastic_history[4], plastic_history[5], plastic_history[6], {"temperature_rise", "K"}};
+  /// The history of a phyxel; all zero: never yielded.
+  struct State : PlasticState<Real> {
+    Real temperature_rise{};  ///< Above the temperature at the start [K].
+  };
+
   Real lambda, mu;          ///< Lamé's parameters [Pa].
   Real yield_stress;        ///< A [Pa]
   Real hardening;           ///< B [Pa]
@@ -205,31 +213,14 @@ struct JohnsonCookFlow : PlasticFlow<Law, Real> {
   /// endless time. The work is that
   /// of the mean of the flow stresses at the begin and the end, at the rate of the step.
   PHYXEL_HD void remember(State& state, Real excess, Real increment, Real dt) const {
-    add_flow(state, excess, increment, mean_flow_stress(state, increment, dt), dt);
-  }
-
- protected:
-  /// The flow stress of a step whose work is that of the step [Pa].
-  PHYXEL_HD Real mean_flow_stress(const State& state, Real increment, Real dt) const {
-    const Real e = state.equivalent_plastic_strain, after = e + increment;
-    const Real mean = Real(0.5) * (hardened(e).stress + hardened(after).stress);
-    return mean * softened(state) * rate_of(increment, reference_rate * dt).factor;
-  }
-  /// Adds Δε̄ and the heat of its work by a stress [Pa] to a history where the excess is positive.
-  PHYXEL_HD void add_flow(State& state, Real excess, Real increment, Real stress, Real dt) const {
     Real& e = state.equivalent_plastic_strain;
+    const Real after = e + increment;
+    const Real mean = Real(0.5) * (hardened(e).stress + hardened(after).stress);
+    const Real stress = mean * softened(state) * rate_of(increment, reference_rate * dt).factor;
     const Real heat = where_larger(Real(endless_time), dt, heating * stress, Real(0));
     const Real warmer = fused(heat, increment, state.temperature_rise);
-    e = where_larger(excess, Real(0), e + increment, e);
+    e = where_larger(excess, Real(0), after, e);
     state.temperature_rise = where_larger(excess, Real(0), warmer, state.temperature_rise);
-  }
-  /// ln max(1, ε̄˙/ε̄˙₀) of a step; 0 in no time.
-  PHYXEL_HD Real logarithm_of_rate(Real increment, Real dt) const {
-    return log_of(ratio_of_rates(increment, reference_rate * dt));
-  }
-  /// T*, not limited.
-  PHYXEL_HD Real relative_temperature(const State& state) const {
-    return fused(per_kelvin, state.temperature_rise, start);
   }
 
  private:
@@ -250,15 +241,11 @@ struct JohnsonCookFlow : PlasticFlow<Law, Real> {
   }
   /// 1 + C ln max(1, ε̄˙/ε̄˙₀). @param slowest ε̄˙₀ Δt; 0: no rate
   PHYXEL_HD Rate rate_of(Real increment, Real slowest) const {
-    const Real one = Real(1), ratio = ratio_of_rates(increment, slowest);
-    const Real factor = fused(rate_factor, log_of(ratio), one);
-    return {factor, where_larger(ratio, one, rate_factor / increment, Real(0))};
-  }
-  /// max(1, ε̄˙/ε̄˙₀); 1 without a rate.
-  PHYXEL_HD static Real ratio_of_rates(Real increment, Real slowest) {
     const Real one = Real(1), none = Real(0);
     const Real ratio = increment / where_larger(slowest, none, slowest, one);
-    return where_larger(slowest, none, where_larger(ratio, one, ratio, one), one);
+    const Real fast = where_larger(slowest, none, where_larger(ratio, one, one, none), none);
+    const Real factor = fused(rate_factor, log_of(where_larger(fast, none, ratio, one)), one);
+    return {factor, where_larger(fast, none, rate_factor / increment, none)};
   }
   /// Δε̄ by which the rate factor alone takes up an excess [Pa]: an upper bound of the answer.
   PHYXEL_HD Real by_rate_alone(Real excess, Real slow, Real slowest) const {
@@ -270,39 +257,12 @@ struct JohnsonCookFlow : PlasticFlow<Law, Real> {
   }
   /// 1 - T*ᵐ.
   PHYXEL_HD Real softened(const State& state) const {
-    const Real heat = smaller(relative_temperature(state), Real(1));
+    const Real relative = fused(per_kelvin, state.temperature_rise, start);
+    const Real heat = smaller(relative, Real(1));
     const Real least = Real(1e-9);
     const Real lost = power_of(larger(heat, least), softening_exponent);
     return where_larger(heat, least, Real(1) - lost, Real(1));
   }
-};
-
-/// Finite-strain J2 plasticity with Johnson and Cook's flow stress and adiabatic heating.
-template <class Real>
-struct JohnsonCook : JohnsonCookFlow<JohnsonCook<Real>, Real> {
-  static constexpr const char* name = "johnson-cook";
-  static constexpr const char* meaning =
-      "metals at high rates: Johnson and Cook's flow stress, which grows with plastic strain and "
-      "its rate, falls with temperature, and heats the material";
-
-  static constexpr bool work_is_potential = false;  // of the rate, and of the temperature before
-
-  static constexpr auto& parameters = johnson_cook_parameters;
-  /// Rejects a melting temperature that is not above the others.
-  static const char* unmet(std::span<const double> p) { return unmet_of_johnson_cook(p); }
-  /// The members of `JohnsonCookFlow`, in their order.
-  static std::array<double, 12> constants(std::span<const double> p) {
-    return constants_of_johnson_cook(p);
-  }
-  /// The smaller of E and 10 A [Pa].
-  static double hourglass_modulus(std::span<const double> values) {
-    return flowing_modulus(values[0], values[3]);
-  }
-
-  static constexpr HistoryNumber history[] = {
-      plastic_history[0], plastic_history[1], plastic_history[2], plastic_history[3],
-      plastic_history[4], plastic_history[5], plastic_history[6], {"temperature_rise", "K"}};
-  using State = JohnsonCookState<Real>;  ///< The history of a phyxel.
 };
 
 }  // namespace phyxel

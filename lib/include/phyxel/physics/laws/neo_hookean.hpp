@@ -2,10 +2,8 @@
 #pragma once
 
 #include <cmath>
-#include <type_traits>
 
 #include "phyxel/physics/laws/small_strain.hpp"
-#include "phyxel/physics/symmetric_functions.hpp"
 
 namespace phyxel {
 
@@ -28,10 +26,11 @@ struct NeoHookean {
 
   /// ψ [J/m³].
   PHYXEL_HD Real energy(const Mat3<Real>& grad_u) const {
+    using std::log1p;
     const Real quarter = Real(0.25) * excess(grad_u), change = volume_change(grad_u);
     const Real shape = Real(0.375) * detail::squares(grad_u) -
                        Real(0.75) * (detail::minors(grad_u) + determinant(grad_u)) +
-                       Real(0.5) * (quarter - logarithm(quarter));
+                       Real(0.5) * (quarter - log1p(quarter));
     return shear() * shape + Real(0.5) * bulk() * change * change;
   }
   /// μ' (1 - 1/(I + 1)) F + λ' (J - α) cof F [Pa].
@@ -69,14 +68,6 @@ struct NeoHookean {
   PHYXEL_HD Real bulk() const { return fused(Real(5.0 / 6.0), hooke.mu, hooke.lambda); }
 
  private:
-  /// ln(1 + x), of scalars by the standard library.
-  PHYXEL_HD static Real logarithm(Real x) {
-    if constexpr (std::is_floating_point_v<Real>) {
-      return std::log1p(x);
-    } else {
-      return log_one_plus(x);
-    }
-  }
   /// I - 3.
   PHYXEL_HD static Real excess(const Mat3<Real>& g) {
     return fused(Real(2), g(0, 0) + g(1, 1) + g(2, 2), detail::squares(g));

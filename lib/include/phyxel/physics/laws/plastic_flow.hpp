@@ -187,35 +187,19 @@ PHYXEL_HD Real wave_stiffness_of_flow(Real lambda, Real mu, Real von_mises,
 ///   remember(state, excess, increment, dt)  adds Δε̄ to a history where excess > 0
 ///   largest_flow_stress()                   σ_y [Pa] that a body may reach, for the step limit
 ///   plastic_work(state)                     ∫ σ_y dε̄ since the virgin state [J/m³]
-/// With packs, `plastic_increment` also gets an excess <= 0, and its result is not used. A law that
-/// damages has, in place of `remember`,
-///   wear(state, trace, von_mises, excess, increment, dt)   also of the trial's tr ε and q [Pa]
-///   worn(state, trace, lambda, mu)         Hencky's law of the damaged material, of its moduli
-///   [Pa]
+/// With packs, `plastic_increment` also gets an excess <= 0, and its result is not used.
 template <class Law, class Real>
 struct PlasticFlow {
   static constexpr bool many_registers = true;
 
   /// The stored elastic energy [J/m³]: Hencky's of F L.
-  template <class State = PlasticFactor<Real>>
-  PHYXEL_HD Real energy(const Mat3<Real>& grad_u, const State& state) const {
-    if constexpr (wears<State>()) {
-      const HenckyStrain<Real> strain = HenckyStrain<Real>::of(state.elastic_gradient(grad_u));
-      return law().worn(state, strain.trace(), law().lambda, law().mu).energy(strain);
-    } else {
-      return elastic().energy(state.elastic_gradient(grad_u));
-    }
+  PHYXEL_HD Real energy(const Mat3<Real>& grad_u, const PlasticFactor<Real>& state) const {
+    return elastic().energy(state.elastic_gradient(grad_u));
   }
   /// The elastic stress ∂ψ/∂∇u [Pa] at a fixed history: Hencky's of F L, pulled back to F.
-  template <class State = PlasticFactor<Real>>
-  PHYXEL_HD Mat3<Real> elastic_stress(const Mat3<Real>& grad_u, const State& state) const {
-    if constexpr (wears<State>()) {
-      const HenckyStrain<Real> strain = HenckyStrain<Real>::of(state.elastic_gradient(grad_u));
-      const Hencky<Real> of_law = law().worn(state, strain.trace(), law().lambda, law().mu);
-      return state.times_transpose(strain.first_piola_stress(of_law.lambda, of_law.mu));
-    } else {
-      return state.times_transpose(elastic().first_piola_stress(state.elastic_gradient(grad_u)));
-    }
+  PHYXEL_HD Mat3<Real> elastic_stress(const Mat3<Real>& grad_u,
+                                      const PlasticFactor<Real>& state) const {
+    return state.times_transpose(elastic().first_piola_stress(state.elastic_gradient(grad_u)));
   }
   /// The linearisation at rest, that of Hencky's law.
   PHYXEL_HD SmallStrain<Real> at_rest(Real volume_stiffness) const {
@@ -247,15 +231,7 @@ struct PlasticFlow {
       PlasticFactor<Real> after = before;
       after.flow(trial, where_larger(excess, Real(0), lost, Real(0)));
       state.replace(excess, after);
-      if constexpr (wears<State>()) {
-        law().wear(state, trial.trace(), von_mises, excess, increment, dt);
-      } else {
-        law().remember(state, excess, increment, dt);
-      }
-    }
-    if constexpr (wears<State>()) {
-      const Hencky<Real> of_law = law().worn(state, trial.trace(), lambda_secant, secant);
-      lambda_secant = of_law.lambda, secant = of_law.mu;
+      law().remember(state, excess, increment, dt);
     }
     return before.times_transpose(trial.first_piola_stress(lambda_secant, secant));
   }
@@ -266,11 +242,6 @@ struct PlasticFlow {
   }
 
  private:
-  /// True for a law that damages.
-  template <class State>
-  static constexpr bool wears() {
-    return requires(const Law& l, const State& s, Real r) { l.worn(s, r, r, r); };
-  }
   PHYXEL_HD const Law& law() const { return static_cast<const Law&>(*this); }
   PHYXEL_HD Hencky<Real> elastic() const { return {law().lambda, law().mu}; }
 };
