@@ -71,7 +71,7 @@ struct Quantised {
   std::int16_t step_of(double value) const {
     if (!std::isfinite(value) || half == 0) return 0;
     return static_cast<std::int16_t>(
-        std::lround(std::clamp((value - middle) / half, -1.0, 1.0) * steps));
+        std::lrint(std::clamp((value - middle) / half, -1.0, 1.0) * steps));
   }
 };
 
@@ -124,6 +124,8 @@ std::vector<double> values_of(const LiveScene& live, const std::vector<Index>& p
 
 /// Numbers of a phyxel that ranks send: displacement, gradient, field.
 constexpr std::size_t sent_each = 13;
+/// Phyxels from which on several threads make a frame.
+constexpr std::size_t worth_threads = 10'000;
 
 void append(std::string& text, const void* data, std::size_t size) {
   text.append(static_cast<const char*>(data), size);
@@ -223,16 +225,15 @@ std::shared_ptr<const std::string> LivePicture::frame(const LiveScene& live, std
                                                       std::uint32_t number) const {
   const std::vector<PhyxelMotion> motions = live.backend().motions_of(here_);
   const std::vector<double> values = values_of(live, here_, motions, field);
-  std::vector<float> sent;
-  sent.reserve(sent_each * here_.size());
+  std::vector<float> sent(sent_each * here_.size());
+#pragma omp parallel for schedule(static) if (motions.size() > worth_threads)
   for (std::size_t k = 0; k < motions.size(); ++k) {
+    float* const to = sent.data() + sent_each * k;
     for (int axis = 0; axis < 3; ++axis) {
-      sent.push_back(static_cast<float>(component(motions[k].displacement, axis)));
+      to[axis] = static_cast<float>(component(motions[k].displacement, axis));
     }
-    for (int e = 0; e < 9; ++e) {
-      sent.push_back(static_cast<float>(motions[k].gradient(e / 3, e % 3)));
-    }
-    sent.push_back(static_cast<float>(values[k]));
+    for (int e = 0; e < 9; ++e) to[3 + e] = static_cast<float>(motions[k].gradient(e / 3, e % 3));
+    to[12] = static_cast<float>(values[k]);
   }
   const std::vector<float> rows = ranks().gathered(std::span<const float>(sent));
   const std::vector<RigidState> rigid = live.backend().rigid_states();
@@ -243,26 +244,27 @@ std::shared_ptr<const std::string> LivePicture::frame(const LiveScene& live, std
   head.phyxels = static_cast<std::uint32_t>(ids_.size());
   head.field = field;
   head.time = live.solver().time();
-  Quantised moved[3], turned;
+  Quantised scales[sent_each], turned;
+#pragma omp parallel for schedule(static) if (place_.size() > worth_threads)
+  for (std::size_t c = 0; c < sent_each; ++c) scales[c] = scale_of(rows, sent_each, c);
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    moved[axis] = scale_of(rows, sent_each, axis);
-    head.middle[axis] = static_cast<float>(moved[axis].middle);
-    head.half[axis] = static_cast<float>(moved[axis].half);
+    head.middle[axis] = static_cast<float>(scales[axis].middle);
+    head.half[axis] = static_cast<float>(scales[axis].half);
   }
   for (std::size_t c = 3; c < 12; ++c) {
-    const Quantised one = scale_of(rows, sent_each, c);
-    turned.half = std::max(turned.half, std::abs(one.middle) + one.half);
+    turned.half = std::max(turned.half, std::abs(scales[c].middle) + scales[c].half);
   }
   head.gradient = static_cast<float>(turned.half);
-  const Quantised coloured = scale_of(rows, sent_each, 12);
+  const Quantised& coloured = scales[12];
   head.low = static_cast<float>(coloured.middle - coloured.half);
   head.high = static_cast<float>(coloured.middle + coloured.half);
 
   std::vector<std::int16_t> numbers(numbers_each * ids_.size());
+#pragma omp parallel for schedule(static) if (place_.size() > worth_threads)
   for (std::size_t k = 0; k < place_.size(); ++k) {
     const float* const row = rows.data() + sent_each * k;
     std::int16_t* const to = numbers.data() + numbers_each * place_[k];
-    for (std::size_t axis = 0; axis < 3; ++axis) to[axis] = moved[axis].step_of(row[axis]);
+    for (std::size_t axis = 0; axis < 3; ++axis) to[axis] = scales[axis].step_of(row[axis]);
     to[3] = coloured.step_of(row[12]);
     for (std::size_t e = 0; e < 9; ++e) to[4 + 4 * (e / 3) + e % 3] = turned.step_of(row[3 + e]);
   }
