@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Measures how many frames a second a live view sends to a page that draws at once: docs/results/view_rates.csv.
+"""Measures how many frames a second a live view sends to a page that draws at once: docs/results/gpu_view.csv.
 
     scripts/measure_view.py build/cuda/bin/phyxel --device cuda --phyxels 1000000     a cube of a million phyxels
     scripts/measure_view.py build/cpu/bin/phyxel examples/dino examples/horn_bug      scenes of their own
@@ -117,7 +117,7 @@ def row_of(program, scene, device, seconds):
     command = [program, "run", scene, "--dry-run", "--json", *(["--device", device] if device else [])]
     facts = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
     rate, speed, kb = measured(program, scene, device, seconds)
-    return [facts["title"], facts["phyxels"], facts["device"].replace(",", ";"), f"{rate:.3g}", f"{speed:.3g}", f"{kb:.4g}"]
+    return [facts["title"].replace(",", ";"), facts["phyxels"], facts["device"].replace(",", ";"), f"{rate:.3g}", f"{speed:.3g}", f"{kb:.4g}"]
 
 
 def main():
@@ -127,7 +127,7 @@ def main():
     parser.add_argument("--phyxels", type=int, nargs="*", default=[], help="cubes of so many phyxels, too")
     parser.add_argument("--device", help="as of phyxel view")
     parser.add_argument("--seconds", type=float, default=8, help="of each measurement")
-    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/results/view_rates.csv", help="table to write")
+    parser.add_argument("--out", type=pathlib.Path, default=ROOT / "docs/results/gpu_view.csv", help="table to write")
     options = parser.parse_args()
     program = options.program.resolve()
     scenes = [scene / "scene.toml" if scene.is_dir() else scene for scene in options.scenes]

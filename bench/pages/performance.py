@@ -264,9 +264,19 @@ def bin_of_dinos(page, table, _):
         f"at most; friction took {row.number('friction_heat_j'):.3g} J, and impacts {'took' if loss > 0 else 'made'} {abs(loss):.3g} J.")
 
 
+def view(page, table, _):
+    page.paragraph("## Live views")
+    page.paragraph(f"Measured by {table.fact('program')}; {table.fact('date')}; by `scripts/measure_view.py`: frames that "
+                   "`phyxel view` sends to a page that draws at once, while the scene runs as fast as it can, up to real time. "
+                   "At most a fifth of the time goes to frames.")
+    page.add(markdown_table(["scene", "phyxels", "device", "frames a second", "simulated seconds a second", "kB a frame"],
+                            [[row["scene"], row["phyxels"], row["device"], row["frames_per_s"], row["speed"], row["kb_per_frame"]]
+                             for row in table.rows]))
+
+
 SECTIONS = {"gpu_error": lambda page, table, results: error.add(page, table, results, "gpu_error"), "gpu_sizes": sizes, "gpu_small": small, "gpu_surfels": surfels, "gpu_neighbours": neighbours,
             "gpu_cantilever": bending, "gpu_terms": terms, "gpu_contact": contact, "gpu_setup": setup, "gpu_profile": profile,
-            "gpu_bin": bin_of_dinos}
+            "gpu_bin": bin_of_dinos, "gpu_view": view}
 
 
 def make(results, link):

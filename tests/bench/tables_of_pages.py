@@ -43,7 +43,8 @@ def made_pages(capsys, *arguments):
 def made_of(name):
     """The tables that a page is made of: file names in docs/results."""
     beginnings = {"performance": ["gpu_sizes", "gpu_capacity", "gpu_small", "gpu_surfels", "gpu_neighbours",
-                                  "gpu_cantilever", "gpu_terms", "gpu_contact", "gpu_setup", "gpu_profile", "gpu_bin"],
+                                  "gpu_cantilever", "gpu_terms", "gpu_contact", "gpu_setup", "gpu_profile", "gpu_bin",
+                                  "gpu_view"],
                   "scaling": ["gpu_ranks_", "cpu_ranks_", "gpu_sizes"],
                   "accuracy": ["accuracy", "calculix", "hard_cases_", "cpu_terms", "gpu_terms"],
                   "laws": ["laws"],
