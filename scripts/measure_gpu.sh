@@ -143,6 +143,8 @@ if has ranks; then
     ranks $n gpu_ranks_${n}a --phyxels 2000376 --seconds 0.3
     ranks $n gpu_ranks_${n}b --phyxels 16974593 --partitioner curve --seconds 0.3
     ranks $n gpu_ranks_${n}c --phyxels 16003008 --weak --partitioner curve --seconds 0.3
+    ranks $n gpu_ranks_${n}f --phyxels 4096000 --partitioner metis --seconds 0.3
+    ranks $n gpu_ranks_${n}g --phyxels 16974593 --partitioner metis --seconds 0.3
     transports=(nccl host)
     if "$program" doctor | grep -q ", CUDA-aware"; then transports+=(mpi); fi
     for transport in "${transports[@]}"; do

@@ -187,6 +187,29 @@ TEST_F(Patches, ShareTheEntriesOfAPointAmongItsRows) {
   EXPECT_EQ(in_patch, (std::vector<char>{0, 0, 1, 1, 1, 0, 0, 0, 0}));
 }
 
+TEST_F(Patches, AreLookedForAmongAllEntriesWithinRangeHoweverLongALargeListIs) {
+  add(0, 0);  // the point
+  for (int k = 0; k < 100; ++k) add(0, k % 3 == 0 ? 0.9 : 1.1);
+  std::vector<Offset> expected, found;
+  for (Offset k = 1; k <= 100; ++k) {
+    if (k % 3 == 1) expected.push_back(k);
+  }
+  const OneThread thread;
+  const std::vector<Offset> list{1, 101, 101, 101, 101};
+  const auto motion_of = [&](Offset k) -> const SurfaceMotion& { return motions_[k]; };
+  const WithinRange in_range(thread, motions_[0], list.data(), motion_of);
+  const WithinRange again(thread, list.data(), in_range.bits());
+  // Of the first 64 entries only those within range are looked at, of others all.
+  for (const auto& near : {in_range, again}) {
+    found.clear();
+    near.each(list.data(), [&](Offset k) {
+      if (k > 64 && motions_[k].after.x > range) return;
+      found.push_back(k);
+    });
+    EXPECT_EQ(found, expected);
+  }
+}
+
 TEST_F(Patches, SleepUntilAPhyxelMayHaveComeWithinRange) {
   add(0, 0);  // the point
   add(0, 1.5);

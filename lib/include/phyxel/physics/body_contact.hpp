@@ -214,7 +214,6 @@ struct SurfaceWeights {
 struct WeightsNear {
   double facing = 0;    ///< Of `SurfaceWeights::weight`.
   double nearness = 0;  ///< Of `SurfaceWeights::nearness`, of those that face the point.
-
   /// True if the surface is so near that it tells where the point is.
   PHYXEL_HD bool tell() const { return facing > 0 && nearness > least_weight; }
 };
