@@ -294,7 +294,7 @@ def test_all_pages_are_written_and_checked(tmp_path, capsys):
     assert check() == (0, "")
     # A number that somebody typed, a chart that is missing, one that nobody shows.
     page = tmp_path / "docs/scaling.md"
-    page.write_text(page.read_text().replace("12721.00", "12722.00"))
+    page.write_text(re.sub(r"(?m)^(\| 2000376 \| float \| metis \| 1 \|[^|]*\|) [0-9.]+ ", r"\1 1.00 ", page.read_text(), count=1))
     (folder / "gpu_sizes.svg").unlink()
     (folder / "gpu_old.svg").write_text("<svg/>")
     code, found = check()
