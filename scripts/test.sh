@@ -80,6 +80,11 @@ tested() {
   build "$1" "${2-$1}" && OMP_WAIT_POLICY=passive ctest --preset "${2-$1}" --parallel "$jobs"
 }
 
+# In CI, deletes the test programs of a build, whose device code takes some ten gigabytes.
+free_programs() {
+  if in_ci; then find "build/$1/tests" -type f -size +50M -delete; fi
+}
+
 failed_tests() {
   local log=build/$1/Testing/Temporary/LastTestsFailed.log
   [[ ! -f $log ]] || sed 's/^[0-9]*:/          /' "$log"
@@ -161,7 +166,7 @@ stage() {
     asan) if have_clang; then tested asan; else without clang; fi ;;
     fuzz) if have_clang; then fuzzed; else without clang; fi ;;
     tsan) if have_clang; then tested_with_tsan; else without clang; fi ;;
-    cuda) if have_nvcc; then tested cuda cuda-tests; else without nvcc; fi ;;
+    cuda) if have_nvcc; then tested cuda cuda-tests && free_programs cuda; else without nvcc; fi ;;
   esac
 }
 
