@@ -34,8 +34,9 @@ struct OneThread {
   }
   /// The first part of lists that this thread has.
   PHYXEL_HD int part() const { return 0; }
-  /// The first entry of this thread's parts of a list, and the end of the last one.
+  /// The first entry of this thread's parts of a list.
   PHYXEL_HD Offset first_of(const Offset* start) const { return start[0]; }
+  /// The end of the last of these parts.
   PHYXEL_HD Offset end_of(const Offset* start) const { return start[contact_threads]; }
   /// The sum of what the threads have.
   template <class T>
