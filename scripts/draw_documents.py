@@ -11,23 +11,13 @@ import argparse
 import pathlib
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
 
+from draw_gallery import PageError, done
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PICTURES = ROOT / "docs/pictures"
-
-
-class DrawingError(Exception):
-    """A command that failed, or a document without what is drawn."""
-
-
-def done(command, folder):
-    """Runs a command in a folder. @throws DrawingError with the last line of its messages"""
-    finished = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True)
-    if finished.returncode != 0:
-        raise DrawingError((finished.stderr.splitlines() or [f"{command[0]}: exit code {finished.returncode}"])[-1])
 
 
 def run_of_dino(program, folder):
@@ -66,7 +56,7 @@ def draw_tutorial(program, folder, out):
     scene = re.search(r"cat > ring.toml <<'END'\n(.*?)\nEND\n", text, re.DOTALL)
     sample = re.search(r"^phyxel (sample ring.obj .*)$", text, re.MULTILINE)
     if not scene or not sample:
-        raise DrawingError("docs/tutorial.md: no scene ring.toml, or no \"phyxel sample ring.obj\"; allowed: both")
+        raise PageError("docs/tutorial.md: no scene ring.toml, or no \"phyxel sample ring.obj\"; allowed: both")
     shutil.copy(ROOT / "examples/mesh/ring.obj", folder)
     (folder / "ring.toml").write_text(scene[1] + "\n", encoding="utf-8")
     done([program, *sample[1].split()], folder)
@@ -92,7 +82,7 @@ def main(arguments=None):
                 DRAWINGS[name](options.program.resolve(), pathlib.Path(folder), drawn)
                 shutil.copyfile(drawn, PICTURES / drawn.name)
                 print(f"docs/pictures/{drawn.name}: {drawn.stat().st_size / 1000:.0f} kB", flush=True)
-    except (DrawingError, OSError) as error:
+    except (PageError, OSError) as error:
         print(f"draw_documents.py: {error}", file=sys.stderr)
         return 2
     return 0

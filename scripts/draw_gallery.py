@@ -26,9 +26,9 @@ from pages.tables import PageError  # noqa: E402
 SIZE = ["--width", "400", "--height", "300"]
 
 
-def done(command):
-    """Runs a command. @throws PageError with the last line of its messages"""
-    finished = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+def done(command, folder=ROOT):
+    """Runs a command in a folder. @throws PageError with the last line of its messages"""
+    finished = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True)
     if finished.returncode != 0:
         raise PageError((finished.stderr.splitlines() or [f"{command[0]}: exit code {finished.returncode}"])[-1])
     return finished.stdout

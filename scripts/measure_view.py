@@ -94,14 +94,13 @@ def measured(program, scene, device, seconds):
                 raise SystemExit("".join(said))
             page = Page(found[0])
             times, sizes = [], []
-            end = None
-            while end is None or time.monotonic() < end:
+            first = None
+            while first is None or time.monotonic() < first + seconds:
                 message = page.hear()
                 if isinstance(message, dict):
                     continue
                 page.send({"do": "seen"})
-                if end is None:  # the first frames wait for the set-up
-                    end = time.monotonic() + seconds
+                if first is None:  # the first frame waits for the set-up
                     first = time.monotonic()
                 times.append(struct.unpack_from("<d", message, 16)[0])
                 sizes.append(len(message))

@@ -137,14 +137,14 @@ __global__ void end_motion(Fields<Real, StateReal> f, SurfacePlaces<Real> s, Poi
   if (threadIdx.x % 32 == 0 && length > 0) raise_to(&way->in_step, length);
 }
 
-/// Numbers of rows or points that kernels add to a list, in any order: the work on each of them
-/// depends on no other.
+/// A list to which kernels add the numbers of rows or points, in any order: the work on one row or
+/// point depends on no other.
 struct NumberList {
   Index* number;
   int* count;
 
   __device__ void add(Index value) const { number[atomicAdd(count, 1)] = value; }
-  /// Calls each(threads, number) for all of them, by groups of threads of any grid.
+  /// Calls each(threads, number) for all numbers, by groups of threads of any grid.
   template <class Each>
   __device__ void for_each(Each&& each) const {
     const ThreadGroup threads;
@@ -153,17 +153,17 @@ struct NumberList {
   }
 };
 
-/// Lists of the rows and points on which more work is to be done in a step.
+/// The rows and points on which a step has more work to do.
 struct ContactLists {
   NumberList near;       ///< Rows whose bodies are near their points.
   NumberList inside;     ///< Rows whose points are inside.
   NumberList active;     ///< Points on which forces act, those of other devices included.
-  std::uint64_t* range;  ///< Of each row: its entries within range, shape [rows, contact_threads].
+  std::uint64_t* range;  ///< Entries within range (`WithinRange`), shape [rows, contact_threads].
 
   __device__ std::uint64_t& range_of(const ThreadGroup& threads, Index r) const {
     return range[contact_threads * static_cast<Offset>(r) + threads.part()];
   }
-  /// The entries of a near row within range, of some threads.
+  /// The entries of a near row that lie within range.
   __device__ WithinRange<ThreadGroup> in_range(const ThreadGroup& threads,
                                                const ContactPasses& passes, Index r) const {
     return {threads, passes.entries_of_row(r), range_of(threads, r)};
@@ -195,7 +195,8 @@ static __global__ void find_patches(ContactPasses passes, ContactLists lists) {
     passes.find_patch(lists.in_range(threads, passes, r), r);
   });
 }
-/// Blocks per multiprocessor: more of them hide more latency than the registers that spill cost.
+/// Finds the touches of near rows. Four blocks share a multiprocessor: they hide more latency than
+/// their spilled registers cost.
 static __global__ void __launch_bounds__(ThreadGroup::block, 4)
     find_touches(ContactPasses passes, ContactLists lists) {
   lists.near.for_each([&](const ThreadGroup& threads, Index r) {

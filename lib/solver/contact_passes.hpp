@@ -111,8 +111,9 @@ struct ContactPasses {
     find_patch(in_range, r);
     if (find_touch_within(threads, in_range, r)) find_carrying(threads, in_range, r);
   }
-  /// The same in four parts, for devices. First: true if a row's body is so near that its point
-  /// may be inside; if not, the row's touch is known. @param in_range its entries within range
+  /// Devices run `find_touch` in four parts. The first part returns true if a row's body is so near
+  /// that the row's point may be inside, and else sets the row's touch.
+  /// @param in_range the row's entries within range
   template <class Threads>
   PHYXEL_HD bool comes_near(const Threads& threads, const WithinRange<Threads>& in_range,
                             Index r) const {
@@ -125,7 +126,7 @@ struct ContactPasses {
     set_touch(threads, r, found);
     return false;
   }
-  /// Second: marks the entries of a row that are in its patch, if its point is beside several.
+  /// The second part marks the entries of a row's patch, if the row's point is beside several.
   template <class Threads>
   PHYXEL_HD void find_patch(const WithinRange<Threads>& in_range, Index r) const {
     const ContactRow& here = row[r];
@@ -136,7 +137,7 @@ struct ContactPasses {
       in_patch[e] = here.patch < patches.count() && patches.of(site[near[e]].rest) == here.patch;
     });
   }
-  /// Third: finds the touch of a row that comes near, but for what `find_carrying` adds.
+  /// The third part finds the touch of a near row, without the fields that `carry` sets.
   /// @returns true if its point is inside
   template <class Threads>
   PHYXEL_HD bool find_touch_within(const Threads& threads, const WithinRange<Threads>& in_range,
@@ -148,7 +149,7 @@ struct ContactPasses {
     set_touch(threads, r, found);
     return found.is_inside;
   }
-  /// Fourth: finds who carries the point of a row that is inside.
+  /// The fourth part finds the phyxels that carry the point of a row, which is inside.
   template <class Threads>
   PHYXEL_HD void find_carrying(const Threads& threads, const WithinRange<Threads>& in_range,
                                Index r) const {
@@ -252,7 +253,7 @@ struct ContactPasses {
                                                    Index r) const {
     return {in_range, row[r].patches == 1 ? nullptr : in_patch};
   }
-  /// Sets the touch of a row, and until when it sleeps.
+  /// Sets the touch of a row, and the way at which the row wakes.
   template <class Threads>
   PHYXEL_HD void set_touch(const Threads& threads, Index r, const SurfaceTouch& found) const {
     const double wakes_at = wakes && found.is_alone ? waking_of(threads, r) : 0;

@@ -194,7 +194,7 @@ struct PlaceAtRest {
 /// Weight of phyxels below which they say nothing of a place.
 inline constexpr double least_weight = 0.05;
 
-/// What the phyxels of a surface near a point weigh.
+/// The weights of a surface's phyxels near a point.
 struct SurfaceWeights {
   const SurfaceMotion& point;
 
@@ -203,7 +203,7 @@ struct SurfaceWeights {
     const Vec3<double> apart = other.after - point.after;
     return surface_weight(dot(apart, apart), common_range(point.range, other.range));
   }
-  /// The weight as far as it faces the point. Most are out of range, which tells it alone.
+  /// The weight of a phyxel by its distance and its facing. Most phyxels are out of range.
   PHYXEL_HD double weight(const SurfaceMotion& other) const {
     const double near = nearness(other);
     return near > 0 ? facing(point, other) * near : 0.0;
@@ -218,7 +218,7 @@ struct WeightsNear {
   PHYXEL_HD bool tell() const { return facing > 0 && nearness > least_weight; }
 };
 
-/// Finds these sums. The parameters are those of `surface_touch`.
+/// Finds the sums of weights. The parameters have the meaning of those of `surface_touch`.
 template <class Threads, class MotionOf>
 PHYXEL_HD WeightsNear weights_near(const Threads& threads, const SurfaceMotion& point,
                                    const Offset* list, MotionOf&& motion_of) {

@@ -61,7 +61,7 @@ PHYXEL_HD int lowest_bit(std::uint64_t bits) {
 }
 
 /// The threads of a pass, which look at the entries of one list within range of a point alone.
-/// These are found once, by their places; what is beyond them has no weight.
+/// The places of phyxels tell these entries once; entries beyond the range have no weight.
 /// @tparam Threads as `OneThread`
 template <class Threads>
 class WithinRange {
@@ -83,7 +83,7 @@ class WithinRange {
     });
   }
 
-  /// The same of entries that have been found before. @param near bits of them, of these threads
+  /// Takes entries that these threads have found before. @param near result of their `bits`
   PHYXEL_HD WithinRange(const Threads& threads, const Offset* list, std::uint64_t near)
       : threads_(threads), first_(threads.first_of(list)), near_(near) {}
 
